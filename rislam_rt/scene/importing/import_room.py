@@ -1,6 +1,7 @@
 """A new room from a file to import, mesh or floor plan: a scene folder, checked before it appears."""
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,11 +85,13 @@ def _draft_of_plan(shapes: list[PlanShape], options: ImportOptions, height: floa
             raise Fault(f"{name}: it says how a mesh lies or was made, and this is a floor plan", "leave it out")
     origin, unit = np.array(options.origin[:2]), UNITS[options.units or "m"]
     points = np.concatenate([np.zeros((0, 2)), *(shape.points for shape in shapes)])
+    doubts: list[str] = []
     if len(points) and (np.abs(points) < IMMEASURABLE).all():  # what is beyond is refused with its shape's name
-        check_size(float(np.linalg.norm(np.ptp(points, axis=0))), options.units)
+        doubts = check_size(float(np.linalg.norm(np.ptp(points, axis=0))), options.units)
         check_near(points * unit - origin, origin)
     shapes = [shape._replace(points=shape.points - origin / unit) for shape in shapes]
-    return extrude(build_plan(shapes, unit, height), height, options)
+    draft = extrude(build_plan(shapes, unit, height), height, options)
+    return replace(draft, remarks=[*doubts, *draft.remarks])
 
 
 def write_room(

@@ -22,7 +22,8 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
     Raises
     ------
     Fault
-        The result has no room's size and the user gave no units, or lies too far from the room's zero.
+        The result has no room's size (one that is large in units that the user gave may be meant), or lies too far
+        from the room's zero.
     """
     units = options.units or "m"
     up = options.up or ("y" if suffix in (".glb", ".gltf") else "z")
@@ -30,9 +31,9 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
     placed = [place_points(part.triangles, up, UNITS[units], origin) for part in parts]
     corners = np.concatenate([t.reshape(-1, 3) for t in placed])
     size = np.ptp(corners, axis=0)
-    check_size(float(np.linalg.norm(size)), options.units)
+    doubts = check_size(float(np.linalg.norm(size)) / UNITS[units], options.units)
     check_near(corners, origin)
-    remarks = [f"{size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} m, with units = {units}, up = {up}"]
+    remarks = [*doubts, f"{size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} m, with units = {units}, up = {up}"]
     facing = np.abs(triangle_cross(np.concatenate(placed))).sum(axis=0)  # twice the area seen along each axis
     other = "y" if up == "z" else "z"
     if options.up is None and facing[1] > 1.2 * facing[2] and size[1] < size[2]:
@@ -58,21 +59,30 @@ def check_near(points: Floats, origin: Floats) -> None:
         )
 
 
-def check_size(diagonal: float, units: str | None) -> None:
-    """Refuse an imported room that has no room's size [m across], and say which unit would mend it.
+def check_size(extent: float, units: str | None) -> list[str]:
+    """Refuse an imported room that has no room's size, and say which unit would mend it.
+
+    `extent` is its diagonal in units of the file. Of a unit that the user gave, what is too small for any agent is
+    refused where another unit fits; of what is large, which may be meant, a remark is returned.
 
     Raises
     ------
     Fault
-        Too small or too large, and the units were not given.
+        Too small, or too large and the units were not given.
     """
-    if units is not None or SMALLEST_ROOM <= diagonal <= LARGEST_ROOM:
-        return
-    fitting = [u for u, length in UNITS.items() if USUAL[0] <= diagonal * length <= USUAL[1] and u != "m"]
-    words = " or ".join(f"--units {u} ({diagonal * UNITS[u]:.2g} m)" for u in fitting)
-    mend = f"give {words}, or --units m if it is meant" if words else "give --units mm, cm, m or in"
-    if not words and diagonal < SMALLEST_ROOM:
+    size = extent * UNITS[units or "m"]
+    if SMALLEST_ROOM <= size <= LARGEST_ROOM:
+        return []
+    fitting = [u for u, length in UNITS.items() if USUAL[0] <= extent * length <= USUAL[1]]
+    words = " or ".join(f"--units {u} ({extent * UNITS[u]:.2g} m)" for u in fitting)
+    what = f"{'in metres' if units is None else f'with --units {units}'} it would measure {size:.4g} m across"
+    if units is not None and (size > LARGEST_ROOM or not words):
+        return [f"{what}: give {words} if that is not meant"] if words else []
+    mend = f"give {words}" if words else "give --units mm, cm, m or in"
+    if words and units is None:
+        mend += ", or --units m if it is meant"
+    if not words and size < SMALLEST_ROOM:
         mend += "; degrees of longitude and latitude have to be projected to metres first"
-    if diagonal * UNITS["mm"] > LARGEST_ROOM:
+    if extent * UNITS["mm"] > LARGEST_ROOM:
         mend = "no unit makes a room of it: mend the coordinates that lie far off"
-    raise Fault(f"in metres it would measure {diagonal:.4g} m across", mend)
+    raise Fault(what, mend)

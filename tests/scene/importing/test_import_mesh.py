@@ -1,5 +1,6 @@
 """Rooms from one mesh: the same walls from every format, unit and axis, and what becomes of things and round ones."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
@@ -142,6 +143,28 @@ def test_a_wrong_unit_is_named_and_nothing_is_written(mesh_file: Callable[..., P
         imported(file)
     assert says in str(caught.value)
     assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_a_given_unit_in_which_nobody_has_room_is_answered_with_the_one_that_fits(
+    mesh_file: Callable[..., Path],
+) -> None:
+    with pytest.raises(
+        SceneError, match=r"with --units mm it would measure 0\.006911 m across; give --units m \(6\.9 m\)$"
+    ):
+        imported(mesh_file(".stl"), units="mm")
+
+
+def test_a_given_unit_in_which_the_room_is_vast_may_be_meant(mesh_file: Callable[..., Path], tmp_path: Path) -> None:
+    said = "with --units m it would measure 6911 m across: give --units mm (6.9 m) if that is not meant"
+    assert said in imported(mesh_file(".stl", 1e-3), units="m")[1]
+    plan = tmp_path / "plan" / "plan.json"
+    plan.parent.mkdir()
+    ring = [[0, 0], [500, 0], [500, 400], [0, 400], [0, 0]]
+    room = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    plan.write_text(json.dumps({"type": "FeatureCollection", "features": [room]}))
+    assert any("give --units cm (6.4 m) or" in remark for remark in imported(plan, units="m")[1])
+    with pytest.raises(SceneError, match=r"with --units mm it would measure 0\.6403 m across; give --units cm"):
+        imported(plan, units="mm")
 
 
 @pytest.mark.parametrize(("carrier_ghz", "faint"), [(10.0, True), (7.5, False)])
