@@ -83,17 +83,17 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     return files | {SCENE_FILE: toml_bytes(_scene_table(scene, agent))}
 
 
-def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:
+def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool | None = None) -> Path:
     """Write files (relative name -> content) under a folder, such as a scene's: a new one appears whole, by one rename.
 
     With `overwrite`, files of an existing folder are replaced one by one, if this program made the room there
-    (`check_made`), and others in it stay.
+    (`check_made`), and others in it stay. None says that the caller has no option for it, which no error then offers.
 
     Raises
     ------
     SceneError
-        The folder exists and `overwrite` is False, it holds files of these names that this program did not make, or its
-        place is taken by a file.
+        The folder exists and `overwrite` is not True, it holds files of these names that this program did not make, or
+        its place is taken by a file.
     StoreError
         The disk refused.
     """
@@ -103,7 +103,8 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     except OSError as error:
         raise SceneError(f"{str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if there and not overwrite:
-        raise SceneError(f"{folder}: exists already; give a folder that does not exist yet")
+        other = ", or --overwrite" if overwrite is False and _holds_our_room(folder, files) else ""
+        raise SceneError(f"{folder}: exists already; give a folder that does not exist yet{other}")
     taken = next((place for place in (folder, *folder.parents) if os.path.lexists(place)), folder)
     if os.path.exists(taken) and not os.path.isdir(taken):
         raise SceneError(f"{taken}: is not a folder; give another")
@@ -146,6 +147,15 @@ def check_made(folder: Path, names: Iterable[str]) -> None:
     if foreign:
         what = f"'{foreign}' there is not of this program's making, and would be replaced"
         raise SceneError(f"{folder}: {what}; give another folder, or move it away")
+
+
+def _holds_our_room(folder: Path, names: Iterable[str]) -> bool:
+    """Whether a folder holds a room whose files of these names may be written over."""
+    try:
+        check_made(folder, names)
+    except SceneError:
+        return False
+    return (folder / SCENE_FILE).is_file()
 
 
 def _content(path: Path) -> str:

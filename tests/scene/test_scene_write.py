@@ -60,12 +60,14 @@ def test_existing_folder_is_left_alone(tmp_path: Path) -> None:
     scene = load_scene(SCENES / "paper_room")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("keep")
-    with pytest.raises(SceneError, match="exists already"):
+    with pytest.raises(SceneError, match=r"does not exist yet$"):
         write_scene(scene, tmp_path / "mine")
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["notes.txt"]
     write_scene(scene, tmp_path / "mine", overwrite=True)
     assert (tmp_path / "mine/notes.txt").read_text() == "keep"
     assert_equal(scene, load_scene(tmp_path / "mine"))
+    with pytest.raises(SceneError, match=r"does not exist yet, or --overwrite$"):
+        write_scene(scene, tmp_path / "mine")
 
 
 def test_a_failed_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,8 +131,8 @@ def test_cross_section_apart_from_the_sphere_is_kept(tmp_path: Path) -> None:
 def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "scene.toml").write_text("mine")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SceneError, match="exists already"):
-        new_scene("paper_room", Path("missing") / "..")
+    with pytest.raises(SceneError, match=r"exists already; give a folder that does not exist yet$"):
+        new_scene("paper_room", Path("missing") / "..")  # nor would --overwrite replace it
     assert (tmp_path / "scene.toml").read_text() == "mine"
     with pytest.raises(SceneError, match="too long"):
         new_scene("paper_room", "x" * 300)

@@ -91,5 +91,5 @@ def test_failures_leave_nothing_behind(tmp_path):
     with pytest.raises(SceneError, match="no shape within the window"):
         new_from_xml("sionna:box", tmp_path / "a", within=[50.0, 50.0, 60.0, 60.0])
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(SceneError, match="exists already"):
+    with pytest.raises(SceneError, match=r"does not exist yet$"):
         write_xml(load_scene("empty_box"), tmp_path)
