@@ -168,10 +168,10 @@ CASES: dict[str, tuple[Change, str, str]] = {
         "beside 'shelf', in its plane; move the panel onto its host",
     ),
     "panel beside its host": (
-        lambda s: panel(furnished(s, "shelf", grid([1, 1, 2], [1, 0, 0], [0, 1, 0], 1, 1)), center=[3, 3, 2],
-                        host="shelf"),
+        lambda s: panel(furnished(furnished(s, "shelf", grid([1, 1, 2], [1, 0, 0], [0, 1, 0], 1, 1)), "pane",
+                                  grid([2, 2, 2], [2, 0, 0], [0, 2, 0], 1, 1)), center=[3, 3, 2], host="shelf"),
         "error ris.center",
-        "beside 'shelf', in its plane",
+        "beside 'shelf', in its plane; move the panel onto its host, or give host = \"pane\", which is there",
     ),
     "host unknown": (lambda s: panel(s, host="roof"), "error ris.host", "'roof' is no reflector; give one of floor"),
     "host not named": (lambda s: panel(s, host=None), "error ris.host", 'add host = "ceiling"'),

@@ -113,13 +113,29 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
     triangles = room.triangles[room.owner == names.index(panel.host)]
     hung = _hung(triangles, panel)
     if not len(hung):
-        yield room.error(f"{key}.center", *_off_host(triangles, panel))
+        message, mend = _off_host(triangles, panel)
+        there = next((name for number, name in enumerate(names) if _may_host(room, number, panel)), None)
+        yield room.error(
+            f"{key}.center", message, f'{mend}, or give host = "{there}", which is there' if there else mend
+        )
         return
-    turn = np.linalg.norm(cross(triangle_planes(triangles[hung])[0], panel.spec.normal), axis=-1).min()
+    turn = _turn(triangles[hung], panel)
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
         message = f"{angle:.2f} degrees from the normal of '{panel.host}'"
         yield room.error(f"{key}.normal", message, "lay it flat on its host")
+
+
+def _may_host(room: TriangleArray, reflector: int, panel: RisPanel) -> bool:
+    """Whether a RIS panel lies flat on the reflector of this number, or just before it."""
+    triangles = room.triangles[room.owner == reflector]
+    hung = _hung(triangles, panel)
+    return len(hung) > 0 and _turn(triangles[hung], panel) <= MAX_TURN
+
+
+def _turn(triangles: Floats, panel: RisPanel) -> float:
+    """Sine of the least angle between the normals of a RIS panel and of triangles (T, 3, 3) of a host."""
+    return float(np.linalg.norm(cross(triangle_planes(triangles)[0], panel.spec.normal), axis=-1).min())
 
 
 def _hung(triangles: Floats, panel: RisPanel) -> Integers:
