@@ -25,7 +25,7 @@ from rislam_rt.pipeline.scores.summary import (
     panel_track,
     relative_errors,
 )
-from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, found_walls, wall_scores
 
 CLUTTER = None
 
@@ -101,6 +101,7 @@ class Tally:
             "true_loss": None,
             "landmarks": self._landmarks(),
             "walls": walls,
+            **found_walls(walls),
             "ghost_walls": count_ghosts(self.scene, self.map),
             "map": map_score(self.scene, self.map, panel=self.panel),
             "association": self._association()._asdict(),

@@ -15,7 +15,7 @@ from rislam_rt.pipeline.scores.component_sources import component_labels, uses_w
 from rislam_rt.pipeline.scores.loss_causes import loss_scores, unnoticed_lines
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
 from rislam_rt.pipeline.scores.true_loss import FAR_OVER, lost_scores, silent_loss_lines
-from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, found_walls, seconds_audible, wall_scores
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 DIVERGED = 0.5
@@ -83,6 +83,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "true_loss": true_loss(scheme, relative, least),
         "landmarks": landmark_scores(scene, scheme, least, landmarks_audible(scene, result.paths, audible)),
         "walls": walls,
+        **found_walls(walls),
         "ghost_walls": count_ghosts(scene, scheme.map),
         "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
         "association": score._asdict(),

@@ -79,13 +79,21 @@ def plane_scores(walls: Mapping[str, Mapping[str, Any]]) -> list[PlaneScore]:
     return scores
 
 
+def found_walls(walls: Mapping[str, Mapping[str, Any]]) -> dict[str, int | None]:
+    """Score of a scheme's walls, those in one plane as one: how many were heard (None where that is not known), and how
+    many of these it found."""
+    planes = plane_scores(walls)
+    asked = all(plane.heard is not None for plane in planes)
+    return {
+        "walls_found": sum(plane.found and plane.heard is not False for plane in planes),
+        "walls_heard": sum(bool(plane.heard) for plane in planes) if asked else None,
+    }
+
+
 def found_of_heard(walls: Mapping[str, Mapping[str, Any]]) -> str:
     """Score of a scheme's walls in words: how many it found of those heard, `7 of 9`; `7` where that is not known."""
-    planes = plane_scores(walls)
-    found = sum(plane.found and plane.heard is not False for plane in planes)
-    if any(plane.heard is None for plane in planes):
-        return str(found)
-    return f"{found} of {sum(bool(plane.heard) for plane in planes)}"
+    found, heard = found_walls(walls).values()
+    return f"{found}" if heard is None else f"{found} of {heard}"
 
 
 def seconds_audible(scene: Scene, paths: Paths, audible: Booleans) -> Floats:

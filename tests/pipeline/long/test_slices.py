@@ -27,7 +27,8 @@ from rislam_rt.storage.netcdf import read_dataset
 ROOT = Path(__file__).parents[3]
 CYCLES, SLICE = 7, 4
 BOUND = {
-    "bound_m", "over_bound", "walls", "ghost_walls", "relative_bound_m", "true_loss", "audible_from_s",
+    "bound_m", "over_bound", "walls", "walls_found", "walls_heard", "ghost_walls", "relative_bound_m", "true_loss",
+    "audible_from_s",
 }  # fmt: skip
 """What only a run in one piece has, and what hangs on it."""
 

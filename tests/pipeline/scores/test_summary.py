@@ -11,7 +11,7 @@ from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import landmark_track, over_budget, summarise
-from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, found_of_heard, wall_scores
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.toml import put_dotted
 
@@ -102,6 +102,7 @@ def test_summary_is_plain_and_complete(short_result):
     for scheme in summary["schemes"].values():
         assert set(scheme["landmarks"]) == {"sphere", "ris"}
         assert len(scheme["walls"]) == 6
+        assert found_of_heard(scheme["walls"]) == f"{scheme['walls_found']} of {scheme['walls_heard']}"
         assert scheme["rmse_m"] > 0.0
         assert scheme["diverged"] is False
 
