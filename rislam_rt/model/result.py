@@ -47,8 +47,8 @@ class SchemeResult:
     component_path: Integers
     """(K, M) truth, for scoring only: path column of each component, -1 for clutter, `NOTHING` beyond their number."""
     component_landmark: Integers
-    """(K, M) number of the landmark (or image) that the agent took each component for; -1 clutter or unused, -2 removed
-    as LOS or wall return, `NOTHING` beyond their number."""
+    """(K, M) number of the landmark, wall, image or pair of walls that the agent took each component for, as
+    docs/files.md says; -1 clutter or unused, -2 removed as LOS or wall return, `NOTHING` beyond their number."""
     ident: Integers
     """(I,) numbers of all landmarks that were ever held."""
     parent: Integers
