@@ -17,7 +17,7 @@ from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.part_names import numbered, plain_name, wall_name
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets, weld
-from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, spans_room
 from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.room_draft import RoomDraft
@@ -95,7 +95,8 @@ def _reflectors(
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
     uses = [plain_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
-    given = [bool(node) and uses.count(node) == 1 for node in uses]
+    own_names = _own_names(shell, uses, room)
+    given = [node in own_names for node in uses]
     for surface, node, own in zip(shell, uses, given, strict=True):
         middle = surface.mesh.triangles.mean(axis=(0, 1))
         place = wall_name(surface.normal, middle, room)
@@ -112,6 +113,17 @@ def _reflectors(
     for name, (_, mesh, number) in zip(names, entries, strict=True):
         found[name] = (mesh, palette.material(name, parts[number].node, parts[number].material))
     return found
+
+
+def _own_names(shell: list[Surface], uses: list[str], room: Floats) -> set[str]:
+    """Names of an imported mesh's nodes, `uses` those of each surface of the shell, that its surfaces keep: of nodes
+    that are one surface, or span less than the room (2, 3) [m], as the reveal of a door."""
+    named = set()
+    for node in set(uses) - {""}:
+        corners = np.concatenate([s.mesh.vertices for s, use in zip(shell, uses, strict=True) if use == node])
+        if uses.count(node) == 1 or not spans_room(np.stack([corners.min(axis=0), corners.max(axis=0)]), room):
+            named.add(node)
+    return named
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:

@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from built_in_rooms.parts import box_walls
+from built_in_rooms.parts import box_walls, grid
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import RislamError, SceneError
@@ -95,7 +95,8 @@ def test_nodes_and_materials_keep_their_names(node_file: Path) -> None:
 
 
 def test_a_name_that_one_surface_has_is_kept(tmp_path: Path) -> None:
-    """Also one that the importer would give to another surface; where several bear it, each is named by its place."""
+    """Also one that the importer would give to another surface; where several bear it, each is named by its place, but
+    for what spans less than the room, as the sides of an opening."""
     import trimesh
 
     given = {
@@ -107,11 +108,15 @@ def test_a_name_that_one_surface_has_is_kept(tmp_path: Path) -> None:
     for node in dict.fromkeys(given.values()):
         mesh = joined([parts[name] for name in given if given[name] == node])
         scene.add_geometry(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False), node_name=node, geom_name=node)
+    sides = joined([grid([2, 2, 0], [1, 0, 0], [0, 0, 2], 1, 1), grid([3, 2, 0], [0, 1, 0], [0, 0, 1], 1, 1)])
+    scene.add_geometry(trimesh.Trimesh(sides.vertices, sides.faces, process=False), node_name="wall reveal")
     file = tmp_path / "named.glb"
     file.write_bytes(scene.export(file_type="glb"))
     room, _ = imported(file, up="z")
     middle = {wall.name: wall.vertices.mean(axis=0) for wall in room.reflectors}
-    assert set(middle) == {"floor_0", "ceiling_0", "wall_north", "wall_003", "wall_south", "wall_north_2"}
+    by_place = {"wall_south", "wall_north_2"}
+    kept = {"floor_0", "ceiling_0", "wall_north", "wall_003", "wall_reveal", "wall_reveal_2"}
+    assert set(middle) == kept | by_place
     assert middle["wall_north"][0] == pytest.approx(0.0, abs=1e-6)
     assert middle["wall_north_2"][1] == pytest.approx(4.0, abs=1e-6)
 

@@ -42,7 +42,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
         regions = np.flatnonzero(node == name)
         if _SHELL.search(name):
             shell += regions.tolist()
-        elif _is_shell(bounds_of(facets, regions), box):
+        elif spans_room(bounds_of(facets, regions), box):
             whole[regions] = True  # a whole room under one name
         else:
             others.append(RegionGroup(name, name, regions))
@@ -50,7 +50,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
     things: list[Integers] = []
     for component in np.unique(facets.component[loose]):
         regions = loose[facets.component[loose] == component]
-        if _is_shell(bounds_of(facets, regions), box):
+        if spans_room(bounds_of(facets, regions), box):
             shell += regions.tolist()
         else:
             things.append(regions)
@@ -59,7 +59,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
     things = [regions for regions, flush in zip(things, inset, strict=True) if not flush]
     for regions in _touching(facets, things):
         bounds = bounds_of(facets, regions)
-        if _is_shell(bounds, box):  # walls that were drawn apart
+        if spans_room(bounds, box):  # walls that were drawn apart
             shell += regions.tolist()
         else:
             others.append(RegionGroup(kind_by_shape(bounds, box), "", regions))
@@ -90,7 +90,7 @@ def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
     return [np.concatenate([things[i] for i in own]) for own in members]
 
 
-def _is_shell(bounds: Floats, room: Floats) -> bool:
+def spans_room(bounds: Floats, room: Floats) -> bool:
     """Whether bounds (2, 3) span enough of an imported room's along two axes to be those of its shell."""
     size = room[1] - room[0]
     share = (bounds[1] - bounds[0]) / np.where(size > 0.0, size, 1.0)
