@@ -57,20 +57,21 @@ def return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
 
 
 def cancelled_return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
-    """Warning, one for a room, of cancelled returns: at two places along the way or more, one after the other, audible
-    single returns of the same two walls leave less than `LEFT` of their energy; `file` is what it names as its place.
+    """Warning, one for a room, of cancelled returns: at two places along the way or more, with none between where both
+    are heard, audible single returns of the same two walls leave less than `LEFT` of their energy; `file` is what it
+    names as its place.
 
     An array with antennas half a wavelength apart hears what comes along its line alike from both ends. In the middle
     between two walls the two returns are in opposite phase where the number of antennas is even, and it hears neither,
-    as long as the agent keeps to the middle. At one place alone a way crosses the middle.
+    as long as the agent keeps to the middle. At one place alone a way crosses the middle; doors in the walls, before
+    which one of them is not heard, part the places where it keeps to it.
     """
     paths, settings = looked.paths, looked.settings
     lone = single_returns(paths)
     audible = audible_paths(paths, settings, use_vt=True)[:, lone]
-    cancel = np.stack([_cancel(looked, cycle, lone) & one[:, None] & one for cycle, one in enumerate(audible)])
-    stays = np.zeros(cancel.shape, dtype=np.bool_)
-    stays[1:] = cancel[1:] & cancel[:-1]
-    stays[:-1] |= stays[1:]
+    both = audible[:, :, None] & audible[:, None]
+    cancel = np.stack([_cancel(looked, cycle, lone) for cycle in range(len(both))]) & both
+    stays = _as_before(cancel, both) | _as_before(cancel[::-1], both[::-1])[::-1]
     share = stays.any(axis=(1, 2)).mean()
     if not share:
         return
@@ -90,6 +91,15 @@ def single_returns(paths: Paths) -> Integers:
     """Columns (N,) of the paths that are single returns of walls, for warnings of these."""
     walls = np.sum(paths.tx_walls >= 0, axis=1) + np.sum(paths.rx_walls >= 0, axis=1)
     return np.flatnonzero((paths.landmark < 0) & (walls == 1) & (paths.kind == PathKind.VT))
+
+
+def _as_before(cancel: Booleans, both: Booleans) -> Booleans:
+    """Which pairs of single returns are cancelled at a place (K, N, N) and at the last one where `both` were heard."""
+    before, found = np.zeros(cancel.shape[1:], dtype=np.bool_), []
+    for one, heard in zip(cancel, both, strict=True):
+        found.append(one & before)
+        before = np.where(heard, one, before)
+    return np.stack(found)
 
 
 def _cancel(looked: Survey, cycle: int, lone: Integers) -> Booleans:

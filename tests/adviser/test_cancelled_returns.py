@@ -72,6 +72,16 @@ def test_who_starts_in_the_middle_or_crosses_it_is_not_warned():
     assert "at 20% of the places" in line
 
 
+def test_doors_beside_the_way_do_not_hide_that_it_keeps_to_the_middle():
+    """At every second place one wall is not there: where both are, the way is in their middle."""
+    found = looked(0.0)
+    valid, labels = found.paths.valid.copy(), [found.paths.label(path) for path in range(found.paths.num_paths)]
+    valid[1::2, labels.index("VT wall_y4")] = False
+    (line,) = lines(found._replace(paths=replace(found.paths, valid=valid)))
+    assert "at 53% of the places" in line
+    assert lines(looked(np.where(np.arange(15) % 2, 0.3, 0.0))) == []  # it goes to and fro, and both are heard
+
+
 def test_the_shipped_rooms_have_none():
     settings = build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml"))
     for room in ("paper_room", "large_hall", "office"):
