@@ -17,6 +17,8 @@ REACH = 6.0
 """Resolution cells of delay on either side over which neighbours are counted."""
 SAME = 0.7
 """Distance [cells] in the other two parameters within which a neighbour counts: one further off does not pull."""
+LEVEL = 0.5
+"""Probability that a path arrives level, as over any upright wall where Tx and Rx are as high as each other."""
 UNSEEN = 0.4
 """SNR of the undetected neighbours in a cell, over the threshold, for each detected neighbour in a cell: set to the
 wall returns of the paper's room, tried on everything else (`benchmarks/receiver/room.py`)."""
@@ -58,14 +60,16 @@ def unmirrored(cosines: Floats, gain: Complexes, radio: RadioConfig) -> tuple[Fl
 def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> Floats:
     """Variances (N, 2) of direction cosines from the ambiguity with grating lobes, a period of the array away.
 
-    The samples are the same for both. Their odds are those of lying in the sky, given the estimate and its deviation.
+    The samples are the same for both. Their odds are those of arriving level (`LEVEL`), at the rim of the unit disc, or
+    anywhere else in the sky, given the estimate and its deviation.
     """
-    period = 1.0 / radio.array.spacing
+    period, deviation = 1.0 / radio.array.spacing, np.maximum(deviation, 1e-12)
     image = cosines - period * np.where(cosines < 0.0, -1.0, 1.0)
-    other = cosines[:, ::-1]
-    inside, image_inside = (
-        scipy.special.ndtr((np.sqrt(np.maximum(1.0 - other**2, 0.0)) - np.abs(x)) / np.maximum(deviation, 1e-12))
+    rim = np.sqrt(np.maximum(1.0 - cosines[:, ::-1] ** 2, 1e-12))
+    own, other = (
+        LEVEL * np.exp(-0.5 * ((np.abs(x) - rim) / deviation) ** 2) / (np.sqrt(2.0 * np.pi) * deviation)
+        + (1.0 - LEVEL) / rim * scipy.special.ndtr((rim - np.abs(x)) / deviation)
         for x in (cosines, image)
     )
     aperture = np.array([radio.array.rows, radio.array.cols]) > 1
-    return aperture * period**2 * image_inside / np.maximum(inside + image_inside, 1e-12)
+    return aperture * period**2 * other / np.maximum(own + other, 1e-12)

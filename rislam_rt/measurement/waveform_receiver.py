@@ -173,7 +173,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     cosines = clip_to_unit_disc(inside)
     variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
-    mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)
+    mirrored = mirror_variance(inside, np.sqrt(variance[:, 1:]), radio)
     scale = np.sqrt(one.noise_psd * one.samples.shape[1] / radio.energy)
     return DetectedComponents(
         np.clip(parameters[:, 0], *window) / radio.bandwidth,

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement import ReceiverConfig, measure
+from rislam_rt.measurement.components import clip_to_unit_disc
 from rislam_rt.measurement.estimation.path_signals import build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import accuracy, fit_amplitudes, refine
 from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.received_signal import add_noise
-from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
+from rislam_rt.measurement.variance_inflation import LEVEL, UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.measurement.waveform_receiver import capture, find_components
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 
@@ -102,6 +103,26 @@ def test_doubt_is_even_on_the_horizon_and_gone_above_it():
     assert variance[1] == pytest.approx(0.0, abs=1e-12)
     blind = RadioConfig(array=RxArray(rows=1, cols=4))
     assert mirror_variance(cosines, np.full((2, 2), 0.02), blind)[0, 0] == 0.0
+
+
+@pytest.mark.parametrize("deviation", [0.002, 0.01, 0.05])
+def test_it_is_the_frequency_with_which_the_other_side_is_true(deviation: float) -> None:
+    """Directions drawn here: half of them level, the others anywhere in the sky, estimated with normal errors."""
+    rng, count = np.random.default_rng(8), 400_000
+    second = rng.uniform(-0.3, 0.3, count)
+    rim = np.sqrt(1.0 - second**2)
+    level = rng.random(count) < LEVEL
+    first = np.where(level, rim, rng.uniform(0.0, 1.0, count) * rim) * rng.choice([-1.0, 1.0], count)
+    estimate = np.column_stack([first + deviation * rng.normal(size=count), second])
+    inside, _ = unmirrored(estimate, np.ones(count, dtype=complex), RADIO)
+    found = clip_to_unit_disc(inside)
+    claimed = mirror_variance(inside, np.full((count, 2), deviation), RADIO)[:, 0] / 2.0**2
+    wrong = np.sign(found[:, 0]) != np.sign(first)
+    assert 0.02 < wrong.mean() < 0.5
+    for low, high in ((0.0, 0.02), (0.02, 0.1), (0.1, 0.3), (0.3, 0.45), (0.45, 0.51)):
+        here = (claimed >= low) & (claimed < high) & (np.abs(found[:, 0]) > 0.8)
+        error = np.sqrt(wrong[here].mean() / here.sum())
+        assert wrong[here].mean() == pytest.approx(claimed[here].mean(), abs=4.0 * error + 0.02), (low, here.sum())
 
 
 def test_level_paths_err_as_reported(make_paths, make_gain):

@@ -18,7 +18,7 @@ def sensor_of_reports(told: SensorModel, reported: tuple[Floats, ...]) -> Sensor
     """
     snr = np.concatenate(reported)
     few = 1 + int(CONSTANTS.rare * len(snr))
-    faint = snr[(0.0 < snr) & (snr < told.threshold)]
+    faint = snr[(snr > 0.0) & (snr < told.threshold)]
     if len(faint) <= few:
         return told
     return replace(told, threshold=float(np.partition(faint, few)[few]))
