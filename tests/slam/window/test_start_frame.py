@@ -17,7 +17,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.window import estimates, start_frame
-from rislam_rt.slam.window.divergence.divergence_monitor import with_velocity
+from rislam_rt.slam.window.divergence.recovery import with_velocity
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.smoother import direction_priors, window_features, window_gaussian
