@@ -80,17 +80,18 @@ def log_associations(
 
 
 def innovations(
-    view: CycleAssociation, log: Log, used: Booleans, cycle: int, axes: int
+    view: CycleAssociation, log: Log, used: Booleans, cycle: int, axes: int, spacing: float
 ) -> tuple[Floats, Floats, Floats]:
     """Innovations (N, 3) of a cycle's associated components, measured less predicted, and the predictions' jacobians
     (N, 3, 7 + 3F) by the present and (N, 3, A + 1) by the attitude about so many `axes` and by the heave, all in
-    standard deviations; the log already holds the associations."""
+    standard deviations; the log already holds the associations, and `spacing` [wavelengths] is that of the antennas."""
     row, at = view.row[used], int(np.searchsorted(log.cycle, cycle)) + view.pick[used]
     lead, mate, share = view.groups.leader[row], view.groups.partner[row], log.share[at, None]
     seen = view.expected.seen[lead] + share * view.groups.gap[row]
     slope = view.expected.jacobian[lead]
     slope = slope + share[..., None] * (view.expected.jacobian[mate] - slope)
     left = log.seen[at] - seen
+    left[:, 1:] = log.nearest(at, left[:, 1:], spacing)
     correct_horizon_bias(seen, log.std[at], left, slope)
     std = np.sqrt(log.std[at] ** 2 + log.extra[at])
     turned = np.concatenate([attitude.jacobian(log.seen[at, 1:], axes), slope[..., 2:3]], axis=2)

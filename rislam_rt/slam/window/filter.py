@@ -242,7 +242,8 @@ def _solve(
     which they were associated. Also returns the association with what the attitude makes of it, residuals, squared
     innovation, and the covariance (A, A) [rad^2] of the attitude."""
     axes = len(state.attitude_variance)
-    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
+    spacing = state.scene.radio.array.spacing
+    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes, spacing)
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
     told = attitude.likelihood(
         innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],

@@ -98,6 +98,16 @@ class Log(NamedTuple):
         inside = np.hypot(1.0 / spacing - cosine, cosine[:, ::-1]) < 1.0 + CONSTANTS.fit * std[:, ::-1]
         return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
 
+    def nearest(self, rows: Integers, left: Floats, spacing: float) -> Floats:
+        """Residuals (A, 2) of the cosines of components `rows` (A,), those that may as well be one period of the array
+        off (`mirrored`) modulo that.
+
+        A level path lies on the rim in every cycle. On which side of it noise puts the estimate is no news of where it
+        arrives from.
+        """
+        turns = np.where(self.mirrored(rows, spacing), np.round(left * spacing), 0.0)
+        return np.asarray(left - turns / spacing)
+
     def mostly_mirrored(self, rows: Integers, which: Integers, count: int, spacing: float) -> Booleans:
         """Whether most of the components `rows` (A,) of each of T = `count` tracks or paths `which` (A,) are `mirrored`
         along either axis of the array (T, 2)."""

@@ -178,6 +178,7 @@ def whitened(state: WindowState, found: Predictions) -> Whitened:
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
     left = log.seen[rows] - found.seen
     left[:, 0] = state.scene.sensor.nearest(left[:, 0])
+    left[:, 1:] = log.nearest(rows, left[:, 1:], state.scene.radio.array.spacing)
     turned = attitude.jacobian(log.seen[rows, 1:], len(state.attitude_variance))
     if state.heaves:
         turned = np.concatenate([turned, found.slopes[..., 2:3]], axis=2)

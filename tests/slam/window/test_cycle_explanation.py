@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.window.cycle_explanation import _names, innovations
+from rislam_rt.slam.window.measurement_log import empty_log
 
 
 def test_a_level_ray_moves_nothing_where_it_is_reported_on_average():
@@ -15,14 +16,32 @@ def test_a_level_ray_moves_nothing_where_it_is_reported_on_average():
     groups = SimpleNamespace(leader=np.array([0]), partner=np.array([-1]), gap=np.zeros((1, 3)))
     expected = SimpleNamespace(seen=np.array([[5.0, 0.6, 0.8]]), jacobian=np.eye(3)[None])
     view = SimpleNamespace(row=np.array([0]), pick=np.array([0]), groups=groups, expected=expected)
-    log = SimpleNamespace(
-        cycle=np.array([7]), share=np.zeros(1), seen=np.array([[5.0, 0.6 * inside, 0.8 * inside]]),
-        std=np.full((1, 3), std), extra=np.zeros((1, 3)),
-    )  # fmt: skip
-    left, slope, _ = innovations(view, log, np.ones(1, dtype=np.bool_), 7, 3)
+    log = _log_of(np.array([[5.0, 0.6 * inside, 0.8 * inside]]), np.full((1, 3), std))
+    left, slope, _ = innovations(view, log, np.ones(1, dtype=np.bool_), 7, 3, 0.5)
     np.testing.assert_allclose(left, 0.0, atol=1e-9)
     assert std * slope[0, 1:, 1:] @ [0.6, 0.8] @ [0.6, 0.8] == pytest.approx(0.5)
     np.testing.assert_array_equal(expected.jacobian, np.eye(3)[None])  # another cycle's map asks it again
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_side_on_which_a_level_ray_is_reported_moves_nothing(side):
+    """Along the array's own line the receiver takes now the one end and now the other, and says so."""
+    groups = SimpleNamespace(leader=np.array([0]), partner=np.array([-1]), gap=np.zeros((1, 3)))
+    expected = SimpleNamespace(seen=np.array([[5.0, 0.9995, 0.02]]), jacobian=np.eye(3)[None])
+    view = SimpleNamespace(row=np.array([0]), pick=np.array([0]), groups=groups, expected=expected)
+    log = _log_of(np.array([[5.0, side * 0.9995, 0.02]]), np.array([[0.01, 0.9, 0.003]]))
+    left, _, _ = innovations(view, log, np.ones(1, dtype=np.bool_), 7, 3, 0.5)
+    assert np.abs(left).max() < 2e-3  # what is left of a period, 1e-3, of a deviation of 0.9
+
+
+def _log_of(seen, std):
+    """Log of components (A, 3) of cycle 7 that are associated with paths alone."""
+    count = len(seen)
+    log, none = empty_log(), np.zeros(count)
+    return log._replace(
+        cycle=np.full(count, 7), share=none, seen=seen, std=std, extra=np.zeros((count, 3)),
+        shared=np.zeros((count, 3)),
+    )  # fmt: skip
 
 
 def test_labels_tell_points_images_walls_and_pairs_of_walls_apart():

@@ -118,6 +118,17 @@ def test_a_direction_that_may_be_one_of_two_counts_from_both_ends():
             np.testing.assert_array_equal(found.row, np.tile(rows, 2))
 
 
+def test_which_side_a_level_cosine_comes_to_lie_on_is_no_news():
+    """Its residual is the same from either side, unless its deviation says that the side is known."""
+    seen, predicted = np.array([0.9998, -0.9998, 0.9998, 0.3]), np.array([0.999, 0.999, -0.999, -0.8])
+    left = np.column_stack([np.full(4, 0.01), seen - predicted])
+    found = _at_the_end(seen, 0.9).nearest(np.arange(4), left, 0.5)
+    np.testing.assert_allclose(found[:, 1], [8e-4, 1.2e-3, -1.2e-3, 1.1], atol=1e-12)
+    for log, spacing in ((_at_the_end(seen, 0.02), 0.5), (_at_the_end(seen, 0.9), 0.4)):  # known, or out of the sky
+        np.testing.assert_array_equal(log.nearest(np.arange(4), left, spacing), left)
+    np.testing.assert_array_equal(found[:, 0], 0.01)
+
+
 def test_only_tracks_at_the_end_of_an_axis_have_two_directions():
     log = _at_the_end(np.array([0.9998, 0.3, -0.9998, 0.3]), 0.9)
     found = log.both_ends(np.arange(4), np.array([0, 1, 0, 1]), 0.5)

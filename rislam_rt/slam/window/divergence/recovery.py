@@ -19,17 +19,17 @@ from rislam_rt.slam.window.state import WindowState
 
 def check_motion(state: WindowState) -> tuple[WindowState, bool]:
     """Recovery from a wrong start, which before any birth a check of the motion against the rates of path lengths
-    corrects; later the same updates the odds of being lost. Also returns whether the start was corrected."""
+    corrects once, in the first cycles; later the same updates the odds of being lost, with a map or without one. Also
+    returns whether the start was corrected."""
     if not motion_agreement.is_checked(state):
         return state, False
-    if len(state.landmarks.ident):
+    begins = not len(state.landmarks.ident) and len(state.heading) <= motion_agreement.PAST + 1
+    if state.start_was_wrong or not begins:  # later the speed may be another
         if state.cycle % motion_agreement.PAST == 0:
             odds = motion_agreement.log_other_motion(state)
             state = state._replace(
                 lost_log_odds=float(np.clip(state.lost_log_odds + odds, CONSTANTS.log_lost, -CONSTANTS.log_lost))
             )
-        return state, False
-    if state.start_was_wrong or len(state.heading) > motion_agreement.PAST + 1:  # by then the speed may be another
         return state, False
     told = motion_agreement.check_start(state)
     if told is None or told.log_odds <= 0.0:

@@ -60,9 +60,7 @@ def log_unheard(
     near = scene.sensor.cell_length + exact
     gap = scene.sensor.nearest(log.seen[:, 0] - length[:, slot])
     wall, heard = (np.abs(gap) < near[:, :1]).nonzero()
-    off, spacing = log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing
-    twofold = log.mirrored(np.arange(len(log.cycle)), spacing)[heard]
-    off[twofold] -= np.round(off[twofold] * spacing) / spacing
+    off = log.nearest(heard, log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing)
     (cos, sin), (x, y) = (side(ends.heading)[slot[heard]] for side in (np.cos, np.sin)), off.T
     off = np.abs(np.stack([cos * x - sin * y, sin * x + cos * y], axis=1))
     inside = (off[:, 0] < near[wall, 1]) & (off[:, 1] < near[wall, 2])
