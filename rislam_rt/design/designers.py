@@ -11,7 +11,7 @@ from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
 from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.design.design_result import Design, DesignConfig, Designer
 from rislam_rt.design.genetic import genetic_search
-from rislam_rt.design.objective import Objective, build_objective
+from rislam_rt.design.objective import Objective, build_objective, relaxation_bound
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
@@ -104,12 +104,3 @@ def best_magnitudes(problem: DesignProblem) -> Floats:
     """Largest gain magnitude (B, P) that each panel path of a design can reach by a code of its own, exactly."""
     samples, panel = problem.response.shape[:2]
     return exact_code(problem.response.reshape(samples, panel, -1), problem.levels)[1]
-
-
-def relaxation_bound(objective: Objective, best: Floats) -> float:
-    """Lower bound [m^2] of the expected CRLB over all codes, against which designers are valued, from the paths' own
-    best gains (B, P).
-
-    The information of these gains exceeds that of every code (as matrices), and the trace of the inverse falls with it.
-    """
-    return float(objective.value(best.reshape(-1).astype(np.complex128)))

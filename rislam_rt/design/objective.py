@@ -102,3 +102,12 @@ def detected_power(power: Floats, least: float) -> Floats:
     ratio = (power / least) ** 2
     ratio = ratio * ratio
     return power * (ratio / (1.0 + ratio))
+
+
+def relaxation_bound(objective: Objective, best: Floats) -> float:
+    """Lower bound [m^2] of the expected CRLB over all codes, against which designers are valued, from the paths' own
+    best gains (B, P).
+
+    The information of these gains exceeds that of every code (as matrices), and the trace of the inverse falls with it.
+    """
+    return float(objective.value(best.reshape(-1).astype(np.complex128)))

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_resolution_cells, join
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.estimation.path_signals import build_sounding, inner_of, waves_at
-from rislam_rt.measurement.estimation.refine import joint_bound
+from rislam_rt.measurement.estimation.path_signals import InnerProducts, build_sounding, inner_of, waves_at
+from rislam_rt.measurement.estimation.positive_definite import inverse
+from rislam_rt.measurement.estimation.refine import amplitude_variance, information_matrix
 from rislam_rt.measurement.received_paths import Received
 from rislam_rt.measurement.received_signal import num_tones
 from rislam_rt.model import RadioConfig
@@ -84,3 +85,12 @@ def _draw(
     units = np.array([1.0 / radio.bandwidth, 1.0, 1.0])
     error = (scale * (root @ draws[parts.path, 2:].T.ravel())).reshape(3, -1).T * units
     return ComponentErrors(error, scale.reshape(3, -1).T * units, gain_std)
+
+
+def joint_bound(inner: InnerProducts, amplitude: Complexes) -> tuple[Floats, Floats]:
+    """Joint Cramér-Rao bound of P paths at unit noise: covariance (3P, 3P) of the parameters, parameter by parameter,
+    and variance (P,) of the complex amplitudes.
+    """
+    known = inverse(inner.signal)
+    information = 2.0 * information_matrix(inner, known, amplitude)
+    return inverse(information), amplitude_variance(inner, known, amplitude, information)

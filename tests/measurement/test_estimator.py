@@ -9,7 +9,7 @@ from rislam_rt.information import delay_gain_information, measurement_std, steer
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.detection_threshold import _half_perimeter, detection_threshold, expected_false_alarms
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, inner_of, waves_at
-from rislam_rt.measurement.estimation.refine import joint_bound
+from rislam_rt.measurement.joint_bound import joint_bound
 from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.waveform_receiver import identify
 from rislam_rt.model import PathKind, RadioConfig, RxArray

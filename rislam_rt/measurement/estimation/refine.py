@@ -216,15 +216,6 @@ def accuracy(fit: LeastSquaresFit) -> Accuracy:
     return Accuracy(deviations, np.sqrt(amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)))
 
 
-def joint_bound(inner: InnerProducts, amplitude: Complexes) -> tuple[Floats, Floats]:
-    """Joint Cramér-Rao bound of P paths at unit noise: covariance (3P, 3P) of the parameters, parameter by parameter,
-    and variance (P,) of the complex amplitudes.
-    """
-    known = inverse(inner.signal)
-    information = 2.0 * information_matrix(inner, known, amplitude)
-    return inverse(information), amplitude_variance(inner, known, amplitude, information)
-
-
 def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes, information: Floats) -> Floats:
     """Variance (P,) of complex amplitudes when the parameters are unknown as well, of Fisher information (3P, 3P).
 

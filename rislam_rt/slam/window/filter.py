@@ -241,8 +241,7 @@ def _solve(
     predictions; re-linearises all poses every few cycles, else the last one. `lively` are the log odds of manoeuvres by
     which they were associated. Also returns the association with what the attitude makes of it, residuals, squared
     innovation, and the covariance (A, A) [rad^2] of the attitude."""
-    axes = len(state.attitude_variance)
-    spacing = state.scene.radio.array.spacing
+    axes, spacing = len(state.attitude_variance), state.scene.radio.array.spacing
     innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes, spacing)
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
     told = attitude.likelihood(

@@ -205,7 +205,7 @@ def with_evidence(
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
-    """Kalman update of tracks `rows` (A,) by components `picks` (A,) of a cycle."""
+    """Kalman update of tracks `rows` (A,) of what the map lacks by components `picks` (A,) of a cycle."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     prior, spread = mean[rows], covariance[rows]
     gain = spread[..., 0] / (spread[..., 0, 0] + observed.std[picks] ** 2)[..., None]

@@ -150,8 +150,9 @@ def hypotheses(
 
 
 def _square_to(alone: Floats, across: Floats, middle: Floats) -> Floats:
-    """Images (W, T, 3) of `middle` in new walls at right angles to W known ones, whose images lie at `across` (W, 3)
-    from it: those of walls `alone` (T, 3), but that what lies towards the known wall comes of the edge with that."""
+    """Hypotheses of new walls at right angles to W known ones, whose images lie at `across` (W, 3) from `middle`: its
+    images (W, T, 3) in them, those of walls `alone` (T, 3), but that what lies towards the known wall comes of the edge
+    with that."""
     normal = across / np.maximum(np.linalg.norm(across, axis=1), 1e-6)[:, None]
     along = normal @ (alone - middle).T
     return np.asarray(alone - along[..., None] * normal[:, None])

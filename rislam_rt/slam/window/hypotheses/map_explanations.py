@@ -135,8 +135,8 @@ def _log_evidence(history: _Predicted, share: Floats, extra: Floats) -> float:
 
 
 def _costs(left: Floats, slopes: Floats) -> Floats:
-    """Costs (S,), -2 log evidence, of residuals (S, B, 3) in deviations, with slopes (S, 3B, N) by unknowns of unit
-    variance: Student's t, by reweighting."""
+    """Costs (S,), -2 log evidence, of explanations by the map that leave residuals (S, B, 3) in deviations, with slopes
+    (S, 3B, N) by unknowns of unit variance: Student's t, by reweighting."""
     trust = np.ones(left.shape[:2])
     for _ in range(2):
         heavy = slopes * np.repeat(trust, 3, axis=1)[..., None]
