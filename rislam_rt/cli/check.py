@@ -43,7 +43,8 @@ def command(
     """Look for what is wrong with a scene, and say what a run in it will hear.
 
     Exit code 2 if it is unusable; warnings are allowed. What a run will hear depends on radio and receiver: those of
-    the main job, of --pipeline, or as changed. What keeps that run from starting in this room is an error, too.
+    the main job, of --pipeline, or as changed, as is how much of the way is looked at (`cycles`). What keeps that run
+    from starting in this room is an error, too.
 
     Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
     """
@@ -57,6 +58,7 @@ def command(
     from rislam_rt.pipeline.room.array_warnings import array_warnings
     from rislam_rt.pipeline.room.late_paths import late_path_warnings
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings, short_motion_warnings
+    from rislam_rt.pipeline.run import cut_scene
     from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.scene import check_scene
     from rislam_rt.scene.load import read_draft
@@ -78,9 +80,10 @@ def command(
     if not any(finding.severity == "error" for finding in findings):
         checked = read_draft(Path(scene)).scene
     if checked is not None:
-        looked = survey(checked, settings)
         places = str(scene_file(scene)), told
         findings += _run_errors(checked, spec, places, changed, named=names_schemes(spec, file, changed))
+        checked = cut_scene(checked, spec.cycles)
+        looked = survey(checked, settings)
         findings += motion_warnings(checked, settings.radio, settings.receiver, spec.budget, places[0])
         findings += short_motion_warnings(checked, spec.budget, places[0])
         if use_directions(spec.schemes):

@@ -51,6 +51,19 @@ def test_the_pipelines_radio_counts_and_a_wrong_setting_is_one_line(check):
     assert "map.doc" in err
 
 
+def test_only_the_part_of_the_way_is_looked_at_that_the_run_goes(check, tmp_path, monkeypatch):
+    """The paper's sphere is too weak at the end of its way, and loud after 60 cycles."""
+    monkeypatch.setattr(link_budget, "survey", partial(link_budget.survey, places=2))
+    ends = []
+    for more in ((), ("--set", "cycles=60")):
+        check("paper_room", "--json", "c.json", *more)
+        ends.append(json.loads((tmp_path / "c.json").read_text())["advice"]["links"][0]["end"]["margin_db"])
+    assert ends[0] < 0.0 < ends[1]
+    code, out, _ = check("paper_room", "--set", "cycles=6000")
+    assert code == 2
+    assert "error: --set: cycles: 6000 received; the scene has 600, give no more" in out
+
+
 def test_an_array_that_tells_no_direction_is_said_before_it_runs(check):
     _, out, _ = check("empty_box", "--set", "radio.array.rows=1", "--set", "radio.array.spacing_wavelengths=1")
     assert "warning: --set: radio.array.rows: 1 x 4 antennas in a line tell no cosine along the body's x" in out
