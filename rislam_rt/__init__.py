@@ -11,14 +11,15 @@ __version__ = "0.1.0"
 _HOMES = {
     "rislam_rt.scene": ("load_scene", "check_scene", "new_scene", "write_scene"),
     "rislam_rt.model": (
-        "Scene", "Trajectory", "Body", "RisPanel", "RisSpec", "RisCode", "RadioConfig", "Paths", "Measurement",
-        "SensorModel", "SlamEstimate", "MapEstimate", "pose_estimate", "SchemeResult", "SlamResult",
+        "Scene", "Scatterer", "Trajectory", "Body", "RisPanel", "RisSpec", "RisCode", "RadioConfig", "Paths",
+        "Measurement", "SensorModel", "SlamEstimate", "MapEstimate", "pose_estimate", "SchemeResult", "SlamResult",
     ),
     "rislam_rt.channel.traced": ("TracedChannel",),
     "rislam_rt.channel.image_source": ("ImageSourceChannel",),
     "rislam_rt.channel.compare": ("compare_paths",),
+    "rislam_rt.ris": ("rephase",),
     "rislam_rt.design": ("design_code", "DesignConfig", "Design"),
-    "rislam_rt.measurement": ("measure", "ReceiverConfig"),
+    "rislam_rt.measurement": ("measure", "ReceiverConfig", "build_sensor"),
     "rislam_rt.slam": ("SlamConfig", "StartPrior"),
     "rislam_rt.pipeline": ("load_spec", "run_slam", "build_radio"),
     "rislam_rt.pipeline.recordings": (

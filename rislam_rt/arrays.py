@@ -25,12 +25,14 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
     Raises
     ------
     GeometryError
-        The value is no array of that type, has another shape, or holds a NaN.
+        The value is no array of that type, complex where real ones are wanted, has another shape, or holds a NaN.
     """
     if isinstance(value, np.ndarray) and value.dtype == dtype and value.base is None and not value.flags.writeable:
         array = value
     else:
         try:
+            if np.dtype(dtype).kind != "c" and np.iscomplexobj(value):
+                raise GeometryError(f"{name}: complex numbers received; give real ones (of an amplitude the modulus)")
             array = np.array(value, dtype=dtype)
         except (TypeError, ValueError, OverflowError):
             what = " ".join(repr(value).split())[:60]

@@ -29,7 +29,7 @@ def check_ranges(section: str, record: Any, error: type[RislamError] = ConfigErr
     Raises
     ------
     RislamError
-        A value is not; of the kind `error`, with the line `section.name: value received; give ...`.
+        A value is not, or no number; of the kind `error`, with the line `section.name: value received; give ...`.
     """
     kind: type = type(record)
     for name, (choices, bounds) in _limits(kind).items():
@@ -38,7 +38,11 @@ def check_ranges(section: str, record: Any, error: type[RislamError] = ConfigErr
             continue
         if choices and value not in choices:
             raise error(f"{section}.{name}: '{value}' received; give one of {', '.join(choices)}")
-        if not all(math.isfinite(value) and getattr(operator, word)(value, limit) for word, limit in bounds):
+        try:
+            good = all(math.isfinite(value) and getattr(operator, word)(value, limit) for word, limit in bounds)
+        except TypeError:
+            raise error(f"{section}.{name}: {str(value)[:60]!r} received; give a number") from None
+        if not good:
             wanted = " and ".join(f"{WORDS[word]} {limit:g}" for word, limit in bounds)
             raise error(f"{section}.{name}: {value} received; give {wanted}")
 

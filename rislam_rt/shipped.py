@@ -41,21 +41,21 @@ def is_shipped(pipeline: Path) -> bool:
 def find_pipeline(name: str | Path) -> Path:
     """Path of a pipeline file from a path or a name: the file if there is one, else the pipeline of that name that
     comes with the package."""
-    given = Path(name)
+    given = Path(os.path.expanduser(name))
     return given if given.is_file() else shipped_pipelines().get(str(name), given)
 
 
 def find_room(name: str | Path) -> Path:
     """Path of a scene from a path or a name: the file or folder if there is one, else the room of that name that comes
     with the package."""
-    given = Path(name)
+    given = Path(os.path.expanduser(name))
     return given if given.exists() else shipped_rooms().get(str(name), given)
 
 
 def room_beside(folder: Path, name: str) -> Path:
     """The scene folder that a pipeline file names: relative to the folder of the file, or the room of that name that
     comes with the package; the folder comes first."""
-    given = Path(os.path.normpath(folder / name))
+    given = Path(os.path.normpath(folder / os.path.expanduser(name)))
     return given if given.exists() else shipped_rooms().get(name, given)
 
 

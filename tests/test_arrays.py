@@ -39,10 +39,19 @@ def test_checks_hold_for_both():
             frozen(array, np.float64, (3,), "x")
 
 
-@pytest.mark.parametrize("value", ["abc", {}, [[1.0], [2.0, 3.0]], [None, object()], 1j, [10**400]])
+@pytest.mark.parametrize("value", ["abc", {}, [[1.0], [2.0, 3.0]], [None, object()], [10**400]])
 def test_what_is_no_array_of_numbers_is_refused_with_its_name(value):
     with pytest.raises(GeometryError, match=r"^x: .* received; give an array of float64$"):
         frozen(value, np.float64, (None,), "x")
+
+
+@pytest.mark.parametrize("value", [1j, [1.0, 2j], np.ones(2, np.complex128), [np.complex128(2.0)]])
+def test_complex_numbers_do_not_lose_their_imaginary_part(value):
+    for dtype in (np.float64, np.int64):
+        with pytest.raises(GeometryError) as found:
+            frozen(value, dtype, (None,), "x")
+        assert str(found.value) == "x: complex numbers received; give real ones (of an amplitude the modulus)"
+    assert frozen([1.0, 2j], np.complex128, (2,), "x")[1] == 2j
 
 
 class Ends(NamedTuple):

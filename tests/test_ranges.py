@@ -31,6 +31,7 @@ class Record:
         ("share", 1.0, "record.share: 1.0 received; give at least 0 and less than 1"),
         ("share", float("nan"), "record.share: nan received; give at least 0 and less than 1"),
         ("number", 0, "record.number: 0 received; give at least 1"),
+        ("size", "10e9", "record.size: '10e9' received; give a number"),
     ],
 )
 def test_what_is_out_of_range_is_refused(name, value, said):

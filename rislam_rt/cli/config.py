@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def command(
     pipeline: PipelineFile = MAIN_JOB,
     set_: Settings = None,
-    explain: Annotated[str | None, typer.Option(metavar="KEY", help="Say all about one setting.")] = None,
+    explain: Annotated[str | None, typer.Option(metavar="KEY", help="Say all about one setting, or a table.")] = None,
     json: JsonFile = None,
 ) -> None:
     """Print every setting of a pipeline: value, unit, range, and what it means.
@@ -33,8 +33,11 @@ def command(
     spec = load_any(pipeline, set_ or ())
     settings = list_settings(type(spec))
     if explain is not None:
-        settings = [find(settings, explain)]
-        _print_one(settings[0], _value(spec, settings[0].key))
+        settings = find(settings, explain)
+        for number, one in enumerate(settings):
+            if number:
+                typer.echo()
+            _print_one(one, _value(spec, one.key))
     else:
         _print_file(settings, spec, pipeline.parent)
     write_json(json, {one.key: one._asdict() | {"value": _plain(_value(spec, one.key))} for one in settings})

@@ -46,7 +46,8 @@ def _run(heard: list[int]) -> int:
 
     reset()
     try:
-        code = app(sys.argv[1:] or ["--help"], prog_name="rislam-rt", standalone_mode=False)
+        words = [at_home(word) for word in sys.argv[1:]]
+        code = app(words or ["--help"], prog_name="rislam-rt", standalone_mode=False)
     except RislamError as error:
         if heard:  # it reached the workers too, and the first to die was mourned
             return _say("interrupted: what is done is kept; the same command goes on from there", EXIT_CODE)
@@ -66,6 +67,13 @@ def _run(heard: list[int]) -> int:
     if code == EXIT_CODE:  # an interrupt that no command has answered
         return _say("interrupted", EXIT_CODE)
     return code if isinstance(code, int) else 0
+
+
+def at_home(word: str) -> str:
+    """Word of the command line with a home folder `~` at its beginning, or that of its value, written out: shells leave
+    it alone behind `=`, and a folder that is called `~` is one that nobody wants."""
+    name, equals, value = word.rpartition("=")
+    return name + equals + os.path.expanduser(value) if value.startswith("~") else os.path.expanduser(word)
 
 
 def _plain(message: str) -> str:

@@ -78,7 +78,7 @@ def command(
 
     A run's folder holds its measurements, too: with its config.toml they give the run's estimate again.
 
-    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --tx 0.05,0,0 --rx -0.05,0,0 --set radio.noise_psd=1e-12
+    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --tx -0.05,0,0 --rx 0.05,0,0 --set radio.noise_psd=1e-12
 
     Example: rislam-rt slam RUN/measurements_random.nc --config RUN/config.toml --truth RUN/truth.tum
     """
@@ -86,11 +86,19 @@ def command(
 
     from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.estimators import use_directions
-    from rislam_rt.pipeline.recordings.answer_files import answer_files, summarise_answers, true_positions
-    from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
+    from rislam_rt.pipeline.recordings.answer_files import (
+        about_answers,
+        answer_files,
+        summarise_answers,
+        true_positions,
+    )
+    from rislam_rt.pipeline.recordings.measurement_warnings import input_warnings
+    from rislam_rt.pipeline.recordings.own_measurements import localise, read_inputs, run_rng
     from rislam_rt.pipeline.room.array_warnings import array_warnings
+    from rislam_rt.pipeline.run import library_versions
+    from rislam_rt.pipeline.schemes import SCHEMES
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.storage.files import write_all
+    from rislam_rt.storage.files import json_file, write_all
     from rislam_rt.storage.netcdf import NETCDF
 
     spec = load_spec(config, set_ or ())
@@ -112,12 +120,19 @@ def command(
     blind = (found.line.partition(": ")[2] for found in told)
     for line in (*input_warnings(inputs, spec), *blind):
         warn(f"{measurements}: {line}")
+    for name in spec.schemes[1:]:
+        if SCHEMES[name].estimator != SCHEMES[spec.schemes[0]].estimator:
+            warn(f"schemes: '{name}' is passed over: the estimator is that of the first, '{spec.schemes[0]}'")
     true = None if truth is None else true_positions(truth, inputs.time + inputs.since)
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
     answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed), place=str(measurements))
-    summary = summarise_answers(inputs, answers, true)
-    write_all(_new_folder(folder), answer_files(inputs, answers))  # another command may have filled it meanwhile
+    summary = {"scheme": spec.schemes[0], **summarise_answers(inputs, answers, true)}
+    files = {
+        **answer_files(inputs, answers),
+        "about.json": json_file(about_answers(inputs, spec, measurements, library_versions()), indent=2),
+    }
+    write_all(_new_folder(folder), files)  # another command may have filled it meanwhile
     for name, value in summary.items():
         typer.echo(f"{name}: {f'{value:.4g}' if isinstance(value, float) else value}")
     typer.echo(f"folder: {folder}")

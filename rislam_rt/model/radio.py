@@ -10,6 +10,8 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.ranges import Count, Positive, check_ranges
 
+CARRIERS = (1e6, 3e12)
+"""Least and largest carrier [Hz], as in a pipeline file."""
 Pattern = Literal["iso", "dipole", "hw_dipole", "tr38901"]
 """Antenna patterns: isotropic, short and half-wave dipole along z, sector of 3GPP TR 38.901 (8 dBi, along body x)."""
 
@@ -123,6 +125,9 @@ class RadioConfig:
 
     def __post_init__(self) -> None:
         check_ranges("radio", self)
+        if not CARRIERS[0] <= self.carrier <= CARRIERS[1]:
+            wanted = f"{CARRIERS[0]:g} to {CARRIERS[1]:g} Hz, 10e9 for 10 GHz"
+            raise ConfigError(f"radio.carrier: {self.carrier:g} Hz received; give {wanted}")
         if self.bandwidth >= 2.0 * self.carrier:
             raise ConfigError(f"radio.bandwidth: {self.bandwidth:g} Hz received; keep it below twice the carrier")
 

@@ -103,7 +103,11 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     except OSError as error:
         raise SceneError(f"{str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if there and not overwrite:
-        other = ", or --overwrite" if overwrite is False and _holds_our_room(folder, files) else ""
+        other = (
+            ", or --overwrite (in Python overwrite=True)"
+            if overwrite is False and _holds_our_room(folder, files)
+            else ""
+        )
         raise SceneError(f"{folder}: exists already; give a folder that does not exist yet{other}")
     taken = next((place for place in (folder, *folder.parents) if os.path.lexists(place)), folder)
     if os.path.exists(taken) and not os.path.isdir(taken):

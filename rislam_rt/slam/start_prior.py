@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
+from rislam_rt.constants import MAX_START_HEADING
 from rislam_rt.errors import ConfigError
 from rislam_rt.ranges import NotNegative, check_ranges
 
@@ -29,6 +30,10 @@ class StartPrior:
     def __post_init__(self) -> None:
         freeze(self, np.float64, position=(3,), velocity=(3,))
         check_ranges("start", self)
+        if not abs(self.heading) <= MAX_START_HEADING:
+            raise ConfigError(
+                f"start.heading: {self.heading:g} rad received; give radians, not degrees: np.radians(...)"
+            )
 
 
 def heading_from_velocity(start: StartPrior) -> StartPrior:

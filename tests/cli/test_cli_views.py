@@ -5,6 +5,9 @@ import re
 import shutil
 from pathlib import Path
 
+import pytest
+
+from rislam_rt.cli.entry_point import at_home
 from rislam_rt.shipped import find_room
 from rislam_rt.storage.checksums import seal
 
@@ -61,3 +64,19 @@ def test_report_of_a_run_with_settings_of_another_version_is_one_line(run, tmp_p
     assert code == 2
     assert "settings that this one does not take (slam.num_particles and 1 more)" in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("words", [("--out=~/room.png",), ("--out", "~/room.png")])
+def test_a_home_folder_is_written_out_wherever_it_stands(run, tmp_path, monkeypatch, words):
+    """No shell does it behind `=`; whoever cleans up a folder called `~` loses the home."""
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    code, _, _ = run("show", "empty_box", "--depth", 0, *words)
+    assert code == 0
+    assert (home / "room.png").exists()
+    assert not (tmp_path / "~").exists()
+    assert find_room("~") == home
+    assert [at_home(word) for word in ("--set=scene=~/a", "a~b", "x=y~", "./~")] == [
+        f"--set=scene={home}/a", "a~b", "x=y~", "./~",
+    ]  # fmt: skip

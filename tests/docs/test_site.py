@@ -17,7 +17,9 @@ ROOT = Path(__file__).parents[2]
 
 def test_the_public_names_are_those_of_the_page_and_explained() -> None:
     page = re.findall(r"^::: ([\w.]+)\.(\w+)$", (ROOT / "docs" / "reference" / "api.md").read_text(), re.MULTILINE)
-    listed = {name: home for home, name in page if name != "errors"}
+    cycle = ("init", "step", "predict", "estimate")  # too common as names of the package itself
+    assert [name for home, name in page if home == "rislam_rt.slam" and name in cycle] == list(cycle)
+    listed = {name: home for home, name in page if name not in ("errors", *cycle)}
     assert listed == rislam_rt._PUBLIC
     for name in rislam_rt._PUBLIC:
         found = getattr(rislam_rt, name)

@@ -51,6 +51,26 @@ def test_a_bad_second_panel_is_named(damaged: Damage, keys: dict[str, object], s
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (
+            "spacing_m = [0.015, 0.015]", "spacing_m = [15.0, 15.0]",
+            "ris.spacing_m: the panel of 90 m x 90 m is larger than the room, 9 m across; in centimetres it would be "
+            "[0.9, 0.9] m, in millimetres [0.09, 0.09] m, in inches [2.286, 2.286] m; give metres: multiply by 0.01",
+        ),
+        (
+            "rows = 6", "rows = 1000",
+            "ris.rows: the panel of 0.09 m x 15 m is larger than the room, 9 m across; take fewer elements, or put",
+        ),
+    ],
+)  # fmt: skip
+def test_a_panel_larger_than_the_room_is_an_error(damaged: Damage, old: str, new: str, says: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load_scene(damaged(old, new))
+    assert says in str(caught.value)
+
+
 @pytest.mark.parametrize("before", [0.0, 0.01, 0.05])
 def test_a_panel_may_hang_a_little_before_its_host(damaged: Damage, before: float) -> None:
     """And it stays where the file says."""

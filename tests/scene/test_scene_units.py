@@ -43,6 +43,14 @@ def test_a_start_in_millimetres_is_named_beside_being_outside(damaged: Damage) -
     assert "[0.5, 0.7, 0.5] m" in units.line
 
 
+def test_a_start_that_fits_in_several_units_is_told_all_of_them() -> None:
+    """One in centimetres was told that it was in millimetres."""
+    (line,) = said({"agent": {"start": [150.0, 120.0, 100.0]}}, np.array([[0.0, 0.0, 0.0], [5.0, 4.0, 2.8]]))
+    words = "in centimetres it would be [1.5, 1.2, 1.0] m, in millimetres [0.15, 0.12, 0.1] m, in inches [3.81, 3.048,"
+    assert words in line
+    assert line.endswith("; give metres: multiply by 0.01 or 0.001 or 0.0254")
+
+
 def test_waypoints_in_millimetres_are_named_one_by_one() -> None:
     lines = said({"agent": {"waypoints": [[1.0, 1.0, 0.5], [4000.0, 1000.0, 500.0], "there", [4, 1]]}})
     assert len(lines) == 1

@@ -66,7 +66,7 @@ def test_existing_folder_is_left_alone(tmp_path: Path) -> None:
     write_scene(scene, tmp_path / "mine", overwrite=True)
     assert (tmp_path / "mine/notes.txt").read_text() == "keep"
     assert_equal(scene, load_scene(tmp_path / "mine"))
-    with pytest.raises(SceneError, match=r"does not exist yet, or --overwrite$"):
+    with pytest.raises(SceneError, match=r"does not exist yet, or --overwrite \(in Python overwrite=True\)$"):
         write_scene(scene, tmp_path / "mine")
 
 

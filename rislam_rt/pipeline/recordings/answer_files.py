@@ -1,6 +1,7 @@
 """Answers of an estimator to a user's own measurements: as files (estimate.tum, estimate.csv, map.json), in short, and
 beside true poses."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,11 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
 from rislam_rt.pipeline.scores.loss_causes import LossTally, words_of_loss
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
 from rislam_rt.scene.write import tum_bytes
+from rislam_rt.storage.checksums import file_digest
 from rislam_rt.storage.files import csv_file, json_file
 
 COLUMNS = (
@@ -48,6 +51,22 @@ def summarise_answers(inputs: Inputs, answers: Answers, true: Floats | None = No
         error = np.array([one.position for one in answers.estimates]) - true
         found["rmse_m"] = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
     return found
+
+
+def about_answers(
+    inputs: Inputs, spec: PipelineSpec, file: Path, versions: Mapping[str, str]
+) -> dict[str, Any]:  # fmt: skip
+    """What the answers of an estimator to the measurements of a file were made from: scheme, settings, start, Tx and
+    Rx, `versions` of the libraries, and the file's name and SHA-256."""
+    start, body = inputs.start, inputs.body
+    return {
+        "scheme": spec.schemes[0],
+        "input": {"file": file.name, "sha256": file_digest(file)},
+        "start": {field.name: np.asarray(getattr(start, field.name)).tolist() for field in fields(start)},
+        "body": {"tx_m": body.tx_offset.tolist(), "rx_m": body.rx_offset.tolist()},
+        "config": spec.model_dump(),
+        "versions": dict(versions),
+    }
 
 
 def answer_files(inputs: Inputs, answers: Answers) -> dict[str, bytes]:

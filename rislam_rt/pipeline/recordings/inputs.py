@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec, SchemeResult
+from rislam_rt.information import amplitude_std, measurement_std
+from rislam_rt.model import Body, DataSheet, Measurement, RadioConfig, RisCode, RisSpec, SchemeResult
 from rislam_rt.model.ris import join_sheets
+from rislam_rt.pipeline.room.array_warnings import untold_axes
 from rislam_rt.pipeline.run_datasets import AXES, names_of
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import Entry, padded, variables
@@ -46,6 +49,8 @@ INPUTS: dict[str, Entry] = {
     "panel_amplitude": (("panel",), "1", "amplitude of an element"),
 }
 """Variables of a recording: axes, unit and meaning of everything that an estimator gets."""
+OPTIONAL = ("from_panel", "which_panel", "code")
+"""Variables that a recording may leave out; without `code` it has none of a panel."""
 
 
 class Inputs(NamedTuple):
@@ -67,6 +72,13 @@ class Inputs(NamedTuple):
     """(K,) phase code that the agent holds to be applied; None without a panel."""
     since: float = 0.0
     """[s] First cycle's time by the clock of a recording or of a user's own file, from which `time` counts."""
+
+    def __repr__(self) -> str:
+        sheets = () if self.panel is None else self.panel.panels
+        panels = ", ".join(f"panel of {sheet.rows} x {sheet.cols}" for sheet in sheets) or "no panel"
+        span = f" over {self.time[-1] - self.time[0]:.4g} s" if len(self.time) else ""
+        heard = sum(len(one) for one in self.measurements)
+        return f"Inputs: {len(self.time)} cycles{span}, {heard} components, {panels}"
 
 
 class RecordedInputs(NamedTuple):
@@ -127,18 +139,30 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
     return xr.Dataset(content, coords, {"Conventions": "CF-1.11", **attributes, **about})
 
 
-def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
-    """Inputs of an estimator from a NetCDF data set with the variables of `INPUTS`; no truth is needed."""
-    marks = data.attrs
-    start = StartPrior(
-        data["start_position"].to_numpy(),
-        data["start_velocity"].to_numpy(),
-        *(float(marks[f"start_{name}"]) for name in ("heading", "position_std", "velocity_std", "heading_std")),
-    )
+def dataset_to_inputs(data: "xr.Dataset", radio: RadioConfig | None = None) -> Inputs:
+    """Inputs of an estimator from a NetCDF data set with the variables of `INPUTS`; no truth is needed.
+
+    Dimensions may stand in any order. A component whose values are all NaN is none, like one with a delay of -9.
+
+    Parameters
+    ----------
+    radio
+        Gives standard deviations that the data set lacks; without it all must be there.
+
+    Raises
+    ------
+    ConfigError
+        A variable or attribute is missing, or has other dimensions or no numbers; the line names it.
+    """
+    _check_variables(data, radio)
+    names = ("heading", "position_std", "velocity_std", "heading_std")
+    marks = (_number_of(data, f"start_{name}") for name in names)
+    start = StartPrior(_values(data, "start_position"), _values(data, "start_velocity"), *marks)
     panel, codes = _panel(data)
-    body = Body(data["tx_offset"].to_numpy(), data["rx_offset"].to_numpy())
-    time, heading = data["time"].to_numpy(), data["heading"].to_numpy()
-    return Inputs(start, body, panel, time, heading, _measurements(data), codes, float(marks.get("since", 0.0)))
+    body = Body(_values(data, "tx_offset"), _values(data, "rx_offset"))
+    time, heading = _values(data, "time"), _values(data, "heading")
+    since = _number_of(data, "since") if "since" in data.attrs else 0.0
+    return Inputs(start, body, panel, time, heading, _measurements(data, radio), codes, since)
 
 
 def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
@@ -149,24 +173,73 @@ def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
     return np.random.default_rng(np.random.SeedSequence(int(data.attrs["filter_entropy"]), spawn_key=key))
 
 
+def _check_variables(data: "xr.Dataset", radio: RadioConfig | None) -> None:
+    """Check that a recording has the variables that it must; a radio stands in for deviations that its array tells."""
+    told = {"tau_std", "cosines_std", "amplitude_std"} if radio is not None else set()
+    if radio is not None and untold_axes(radio.array):
+        told.remove("cosines_std")
+    given = {str(name) for name in data.variables} | {*OPTIONAL, *told}
+    missing = [name for name in INPUTS if name not in given and ("code" in data or not name.startswith("panel_"))]
+    if missing:
+        compass = " (heading: NaN without a compass, with slam.heading=estimated)" if "heading" in missing else ""
+        what = f"give {'them' if len(missing) > 1 else 'it'} as in a run folder's measurements_<scheme>.nc"
+        raise ConfigError(f"{', '.join(missing)}: missing; {what}{compass}")
+
+
+def _mark(data: "xr.Dataset", name: str) -> Any:
+    """Value of an attribute of a recording."""
+    if name not in data.attrs:
+        raise ConfigError(f"attribute {name} is missing; give it")
+    return data.attrs[name]
+
+
+def _number_of(data: "xr.Dataset", name: str) -> float:
+    """Number in an attribute of a recording."""
+    value = _mark(data, name)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ConfigError(f"attribute {name}: {str(value)[:40]} received; give a number") from None
+
+
+def _values(data: "xr.Dataset", name: str) -> NDArray[Any]:
+    """Real numbers of a variable of a recording, along the dimensions of `INPUTS`."""
+    dims, found = INPUTS[name][0], data[name]
+    if sorted(map(str, found.dims)) != sorted(dims):
+        have = ", ".join(map(str, found.dims)) or "none"
+        raise ConfigError(f"{name}: dimensions: {have} received; give {', '.join(dims)}")
+    values: NDArray[Any] = found.transpose(*dims).to_numpy()
+    if values.dtype.kind in "mM":
+        kind = "datetime64" if values.dtype.kind == "M" else "timedelta64"
+        raise ConfigError(f"{name}: {kind} received; give {'seconds' if INPUTS[name][1] == 's' else 'numbers'}")
+    if values.dtype.kind == "c":
+        raise ConfigError(f"{name}: complex numbers received; give real ones (of an amplitude the modulus)")
+    if values.dtype.kind not in "biuf":
+        raise ConfigError(f"{name}: not numbers; mend the variable")
+    return values
+
+
 def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, ...]]:
     """Data sheet of the RIS panels among recorded inputs, and the phase code of each cycle; None without a panel."""
     if "code" not in data:
         return None, (None,) * data.sizes["time"]
-    levels, elements = int(data.attrs["panel_levels"]), names_of(data.attrs["panel_element"])
-    parts = (data[f"panel_{name}"].to_numpy() for name in ("shape", "spacing", "normal", "up", "amplitude"))
+    levels, elements = int(_number_of(data, "panel_levels")), names_of(_mark(data, "panel_element"))
+    parts = (_values(data, f"panel_{name}") for name in ("shape", "spacing", "normal", "up", "amplitude"))
     sheets = tuple(
         RisSpec(int(rows), int(cols), spacing, normal, up, levels, element, float(amplitude))
         for (rows, cols), spacing, normal, up, amplitude, element in zip(*parts, elements, strict=True)
     )
-    return join_sheets(sheets), tuple(RisCode(code, levels) for code in data["code"].to_numpy())
+    return join_sheets(sheets), tuple(RisCode(code, levels) for code in _values(data, "code"))
 
 
-def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
+def _measurements(data: "xr.Dataset", radio: RadioConfig | None) -> tuple[Measurement, ...]:
     """Measurements of a NetCDF recording, one a cycle, without the padding; an error names the cycle, from 0."""
     fields = {name: name for name in (*PARTS, "from_panel")} | {"which_panel": "panel"}
-    table = {field: data[name].to_numpy() for name, field in fields.items() if name in data}
-    held = table["tau"] != PADDING
+    table = {field: _values(data, name) for name, field in fields.items() if name in data}
+    empty = [np.isnan(value).all(axis=tuple(range(2, value.ndim))) for value in table.values()]
+    held = (table["tau"] != PADDING) & ~np.all(empty, axis=0)
+    if radio is not None and not set(PARTS) <= set(table):
+        table = _deviations(table["amplitude"], radio) | table
     made = []
     for cycle in range(data.sizes["time"]):
         try:
@@ -174,3 +247,13 @@ def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
         except RislamError as error:
             raise ConfigError(f"cycle {cycle}: {str(error).removeprefix('Measurement.')}") from None
     return tuple(made)
+
+
+def _deviations(amplitude: Floats, radio: RadioConfig) -> dict[str, Floats]:
+    """Standard deviations of measurements (K, M) that are lone paths of their amplitude, as fields."""
+    bound = measurement_std(radio.integrated_snr(amplitude), radio)
+    return {
+        "tau_std": bound.tau,
+        "cosines_std": bound.cosines,
+        "amplitude_std": np.full(amplitude.shape, amplitude_std(radio)),
+    }

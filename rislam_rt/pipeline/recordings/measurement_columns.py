@@ -32,7 +32,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
 LONGEST_DELAY = 1e-5
 """[s] Largest delay accepted, 3 km: a larger number is in another unit."""
 ROUNDING = 1e-6
-"""By how much the sum of two squared direction cosines may exceed 1: the rounding of tables with six digits."""
+"""[rad] By how much the headings of one cycle may differ: the rounding of tables with six digits."""
+BEYOND_HORIZON = 1.5e-3
+"""By how much the sum of two squared direction cosines may exceed 1: the rounding of tables with three digits, in which
+level paths, that lie on the horizon, come out beyond it."""
 LARGEST_SNR_DB = 200.0
 """[dB] Largest SNR accepted, of either sign: a larger number is no decibel."""
 FINEST_STD = 1e-15
@@ -103,10 +106,10 @@ def check_components(columns: Mapping[str, Floats], heard: Booleans, place: str)
         _check_range(name, column, heard, place)
     if "cos_x" in columns and "cos_y" in columns:
         squares = np.where(heard, columns["cos_x"] ** 2 + columns["cos_y"] ** 2, 0.0)
-        odd = np.flatnonzero(squares > 1.0 + ROUNDING)
+        odd = np.flatnonzero(squares > 1.0 + BEYOND_HORIZON)
         if len(odd):
             raise ConfigError(
-                f"{place}: cos_x, cos_y: squares that sum to {squares[odd[0]]:g} in row {odd[0] + 1} of the data, "
+                f"{place}: cos_x, cos_y: squares that sum to {squares[odd[0]]:.6g} in row {odd[0] + 1} of the data, "
                 f"which no direction has; give at most 1 ({BACK_TO_HORIZON})"
             )
 

@@ -1,7 +1,7 @@
 """A user's own measurements: reads a table, a CSV or a NetCDF file, checks it, and estimates pose and map from it."""
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,18 +10,17 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.blas_threads import in_one_blas_thread
-from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import ConfigError, RislamError, StoreError
+from rislam_rt.errors import ConfigError, RislamError, StoreError, expect
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.input_messages import parse_number
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.cycle import usual_step
-from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
+from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.measurement_columns import (
     BACK_TO_HORIZON,
+    BEYOND_HORIZON,
     FINEST_STD,
     LONGEST_DELAY,
-    ROUNDING,
     check_amplitude,
     check_components,
     check_heading,
@@ -31,7 +30,7 @@ from rislam_rt.pipeline.recordings.measurement_columns import (
 from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.room.array_warnings import untold_axes
 from rislam_rt.pipeline.run_datasets import dataset_checksum
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import NETCDF, read_dataset
 
@@ -40,10 +39,6 @@ LONGEST_STEP = 10.0
 LONGEST_STRIDE = 5.0
 """[m] Way at the start's speed in a median time above `LONGEST_STEP` from which on the times are refused: an agent that
 goes across a room from one cycle to the next has its times in another unit."""
-EARLY = 0.05
-"""Part of the way from Tx to Rx by which a path may be shorter without a warning: tape measures err by so much."""
-SHORTEST_STEP = 1e-3
-"""[s] Median time between cycles of one component each below which the times are warned of: each row has its own."""
 
 
 @in_one_blas_thread
@@ -64,6 +59,7 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator, pl
     ConfigError
         There is no heading from a compass, and the estimator is to take the headings for known.
     """
+    expect("spec", spec, PipelineSpec)
     if np.isnan(inputs.heading).any():
         if spec.slam.heading == "known":
             raise ConfigError(
@@ -90,7 +86,7 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
     start
         Prior of the first pose; a NetCDF file has its own, a CSV file needs it.
     radio
-        Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
+        Turns SNRs into amplitudes, and gives standard deviations that the file lacks.
     body
         Offsets of Tx and Rx for a CSV file; None as in `inputs_of`.
 
@@ -112,15 +108,14 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
                 "'checksum' out of a file of your own"
             )
         try:
-            made = _check_inputs(dataset_to_inputs(data), str(file))
+            made = _check_inputs(dataset_to_inputs(data, radio), str(file))
             if not len(made.time):
                 raise ConfigError(f"{file}: no cycles; give at least one")
             return made._replace(time=made.time - made.time[0], since=made.since + float(made.time[0]))
         except RislamError as error:
             raise ConfigError(str(error) if str(file) in str(error) else f"{file}: {error}") from None
-        except (KeyError, ValueError, TypeError) as error:
-            said = " ".join(str(error.args[0] if error.args else error).split())
-            cause = said.partition(". Did you mean")[0][:80]
+        except (ValueError, TypeError) as error:
+            cause = " ".join(str(error).split())[:80]
             raise ConfigError(f"{file}: {cause}; give one as a run folder's measurements_<scheme>.nc") from None
     table = _read_csv(file)
     if start is None:
@@ -194,62 +189,6 @@ def inputs_of(
     return _check_inputs(made, place)
 
 
-def input_warnings(inputs: Inputs, spec: PipelineSpec) -> list[str]:
-    """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
-    component with a time of its own, components that are there twice, too weak for the receiver or too early."""
-    step = usual_step(inputs.time)
-    counts, lines, row = {len(one) for one in inputs.measurements}, [], 0
-    copies: list[str] = []
-    if step > LONGEST_STEP:
-        lines.append(f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds")
-    if counts == {1} and 0.0 < step < SHORTEST_STEP:
-        lines.append(
-            f"time_s: every cycle holds one component, {step:g} s apart; rows of one time are one cycle: round them"
-        )
-    for time, one in zip(inputs.time + inputs.since, inputs.measurements, strict=True):
-        seen: set[bytes] = set()  # noise never draws two that are alike
-        for number, values in enumerate(np.column_stack([getattr(one, name) for name in PARTS])):
-            if values.tobytes() in seen:
-                copies.append(f"row {row + number + 1} of the data, at {time:.10g} s")
-            seen.add(values.tobytes())
-        row += max(len(one), 1)  # a cycle in which nothing was heard is a row, too
-    if copies:
-        what = "component is an exact copy" if len(copies) == 1 else "components are exact copies"
-        lines.append(f"{len(copies)} {what} of another in the same cycle, the first in {copies[0]}; leave copies out")
-    return [*lines, *_weak_components(inputs, spec), *_early_paths(inputs)]
-
-
-def _weak_components(inputs: Inputs, spec: PipelineSpec) -> Iterator[str]:
-    """Line about a user's own measurements of which most components are too weak for their receiver to report them."""
-    settings = build_settings(spec)
-    snr = np.concatenate([settings.radio.integrated_snr(one.amplitude) for one in inputs.measurements])
-    weak = int(np.count_nonzero(snr < settings.sensor.threshold))
-    if weak > 0.5 * len(snr):
-        decibels = 10.0 * np.log10([float(np.median(snr)), settings.sensor.threshold])
-        yield (
-            f"amplitude or snr_db: {weak} of {len(snr)} components are below the detection threshold of "
-            f"{decibels[1]:.3g} dB, the middle one at {decibels[0]:.3g} dB, and the filter takes few for landmarks, or "
-            "none; give the modulus of the gain, not power, and the radio's energy, noise_psd and array"
-        )
-
-
-def _early_paths(inputs: Inputs) -> Iterator[str]:
-    """Line about a user's own measurements whose shortest path is mostly shorter than from Tx to Rx, by more than it
-    errs: no path is, by clocks that agree."""
-    baseline, cycles, early = float(np.linalg.norm(inputs.body.tx_offset - inputs.body.rx_offset)), 0, []
-    for one in inputs.measurements:
-        if len(one):
-            cycles, first = cycles + 1, int(np.argmin(one.tau))
-            length, error = SPEED_OF_LIGHT * one.tau[first], SPEED_OF_LIGHT * one.tau_std[first]
-            early += [float(length)] if length + 5.0 * error < (1.0 - EARLY) * baseline else []
-    if len(early) > 0.5 * cycles:
-        yield (
-            f"delay_s: in {len(early)} of {cycles} cycles the shortest path ({np.median(early):.3g} m) is shorter than "
-            f"from Tx to Rx ({baseline:.3g} m), which is taken for clocks that are apart, if at all; give delays "
-            "of the whole way, not halves or from the first path on, and Tx and Rx where they are"
-        )
-
-
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:
     """Check units and ranges of a user's own measurements, and return them."""
     for cycle, one in enumerate(inputs.measurements):
@@ -268,12 +207,12 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
         if reach > 1.0:
             raise ConfigError(f"{where}: cosine of {reach:g} received; give {cosine_wanted(reach)}")
         squares = np.sum(one.cosines**2, axis=-1).max(initial=0.0)
-        if squares > 1.0 + ROUNDING:
+        if squares > 1.0 + BEYOND_HORIZON:
             raise ConfigError(
-                f"{where}: cosines whose squares sum to {squares:g} received, which no direction has; give at most 1 "
+                f"{where}: cosines whose squares sum to {squares:.6g} received, which no direction has; give at most 1 "
                 f"({BACK_TO_HORIZON})"
             )
-        for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
+        for name in ("amplitude", "tau_std", "cosines_std", "amplitude_std"):
             value = getattr(one, name)
             good = np.isfinite(value) & (value > 0.0)
             if not good.all():
@@ -312,6 +251,7 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig) -> dict[str, Floa
         amplitude = np.sqrt(snr * radio.noise_psd / (radio.array.num_antennas * radio.energy))
     if "cos_x" in columns and "cos_y" in columns:
         cosines = np.stack([columns["cos_x"], columns["cos_y"]], axis=-1)
+        cosines /= np.maximum(np.linalg.norm(cosines, axis=-1, keepdims=True), 1.0)  # what rounding put beyond
     else:
         theta, phi = columns["theta_r_rad"], columns["phi_r_rad"]
         cosines = np.sin(theta)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)

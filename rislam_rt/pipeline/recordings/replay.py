@@ -9,7 +9,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.blas_threads import in_one_blas_thread
-from rislam_rt.errors import ConfigError, expect
+from rislam_rt.errors import ConfigError, GeometryError, expect
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.estimate_checks import check_estimate
@@ -85,12 +85,13 @@ def answers_from_arrays(
         spread[:, :3, :3] = covariance
     known_heading = np.where(np.isnan(inputs.heading), inputs.start.heading, inputs.heading)
     rows = zip(position, known_heading, spread, found, strict=True)
-    estimates = [
-        check_estimate(
-            SlamEstimate(place, np.zeros(3), float(heading), cov, np.zeros((0, 3)), inputs.body, one), f"cycle {cycle}"
-        )
-        for cycle, (place, heading, cov, one) in enumerate(rows)
-    ]
+    estimates = []
+    for cycle, (place, heading, cov, one) in enumerate(rows):
+        try:
+            made = SlamEstimate(place, np.zeros(3), float(heading), cov, np.zeros((0, 3)), inputs.body, one)
+        except GeometryError as error:
+            raise ConfigError(f"cycle {cycle}: {str(error).removeprefix('SlamEstimate.')}") from None
+        estimates.append(check_estimate(made, f"cycle {cycle}"))
     none = [np.full(len(m), -1) for m in inputs.measurements]
     said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
     told = zip(landmark or none, said, strict=True)

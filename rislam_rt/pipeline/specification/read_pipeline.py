@@ -1,5 +1,6 @@
 """Read a pipeline file, with settings of the command line put over it, and check its keys and values."""
 
+import os
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, expect
 from rislam_rt.input_messages import did_you_mean, expected_input, nearest
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
@@ -79,6 +80,10 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     ConfigError
         The file cannot be read or is not TOML; a setting has no such form.
     """
+    expect("path", path, (str, os.PathLike))
+    if isinstance(overrides, str) or not isinstance(overrides, Sequence):
+        what = repr(overrides[:60]) if isinstance(overrides, str) else type(overrides).__name__
+        raise ConfigError(f"overrides: {what} received; give a list of settings, e.g. ['radio.bandwidth_ghz=0.5']")
     path = find_pipeline(path)
     content = _read_toml(path)
     changed = tuple(_override(content, setting, path.parent) for setting in overrides)

@@ -50,8 +50,9 @@ def list_settings(model: type[BaseModel], prefix: str = "") -> list[Setting]:
     return plain + tables
 
 
-def explain(settings: list[Setting], key: str) -> Setting:
-    """Setting of a pipeline file with that dotted key, or with the only key that ends with it.
+def explain(settings: list[Setting], key: str) -> list[Setting]:
+    """Setting of a pipeline file with that dotted key, or with the only key that ends with it; of a table all settings,
+    and then those elsewhere whose keys end with its name.
 
     Raises
     ------
@@ -60,8 +61,9 @@ def explain(settings: list[Setting], key: str) -> Setting:
     """
     exact = [one for one in settings if one.key == key]
     found = exact or [one for one in settings if one.key.endswith(f".{key}")]
-    if len(found) == 1:
-        return found[0]
+    table = [one for one in settings if one.key.startswith(f"{key}.")]
+    if table or len(found) == 1:
+        return [*table, *found]
     if found:
         raise ConfigError(
             f"--explain {key}: several settings end so; give one of {', '.join(one.key for one in found)}"

@@ -12,6 +12,7 @@ from rislam_rt.model import RadioConfig, RisPanel
 from rislam_rt.model.delay_spread import delay_spread_remark
 from rislam_rt.scene.check.mesh_queries import ray_hits, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
+from rislam_rt.scene.check.units import WIDEST_SPACING, units_that_fit
 from rislam_rt.scene.findings import Finding, panel_key
 
 MAX_TURN = 1e-2
@@ -21,8 +22,9 @@ THICKEST = 0.05
 
 
 def panel_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of a RIS panel out of bounds, off its host, facing out, or over another panel."""
+    """Scene check: errors of a RIS panel too large, out of bounds, off its host, facing out, or over another panel."""
     for panel, key in _keyed(room):
+        yield from _too_large(room, panel, key)
         at = panel.center
         tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
         if len(tolerant.outside(at[None])):
@@ -85,10 +87,29 @@ def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioCon
         yield room.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
+def _too_large(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
+    """Scene check: error of a RIS panel with a side longer than the room's diagonal, with the units in which it would
+    fit."""
+    spec = panel.spec
+    sides, diagonal = _sides(panel), float(np.linalg.norm(np.ptp(room.bounds, axis=0)))
+    if sides.max() <= diagonal:
+        return
+    message = f"the panel of {sides[0]:.3g} m x {sides[1]:.3g} m is larger than the room, {diagonal:.3g} m across"
+    meant = units_that_fit(sides, lambda fitting: fitting.max() <= diagonal)
+    if spec.spacing.max() > WIDEST_SPACING and meant is not None:
+        yield room.error(f"{key}.spacing_m", f"{message}; {meant[0]}", meant[1])
+    else:
+        yield room.error(f"{key}.rows", message, "take fewer elements, or put them closer")
+
+
+def _sides(panel: RisPanel) -> Floats:
+    """Width and height (2,) [m] of a RIS panel."""
+    return panel.spec.spacing * [panel.spec.cols, panel.spec.rows]
+
+
 def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
     """Scene check: warning of a RIS panel that reaches beyond the bounds of the room."""
-    spec = panel.spec
-    sides = spec.spacing * [spec.cols, spec.rows]
+    spec, sides = panel.spec, _sides(panel)
     half = 0.5 * (sides[0] * np.abs(spec.right) + sides[1] * np.abs(spec.up))
     low, high = room.bounds
     over = float(np.maximum(low - (panel.center - half), panel.center + half - high).max())

@@ -4,7 +4,7 @@ It looks at the scene file as a plain table and at whatever meshes could be read
 outside the room does not hide that the room was drawn in millimetres.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from rislam_rt.scene.mesh_placement import UNITS
 
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
 """Units other than metres that rooms are drawn in, and their names in a scene file."""
+GUESSES = ("centimetres", "millimetres", "inches")
+"""Units that points and lengths are given in by mistake, in the order in which they are named."""
 LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
 """Longest side [m] of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
 MANY = 20.0
@@ -26,8 +28,10 @@ FAR = 3.0
 """Distance of a point from the room, in sizes of the room, above which it was given in another unit."""
 LONGEST_CYCLE = 10.0
 """Longest cycle [s] taken for meant."""
+WIDEST_SPACING = 0.5
+"""Largest spacing [m] of a RIS panel's elements taken for meant."""
 LIMITS = (
-    (("ris", "spacing_m"), 0.5, "m", "millimetres", 1e-3),
+    (("ris", "spacing_m"), WIDEST_SPACING, "m", "millimetres", 1e-3),
     (("reflector", "material", "thickness_m"), 3.0, "m", "millimetres", 1e-3),
     (("agent", "cycle_s"), LONGEST_CYCLE, "s", "milliseconds", 1e-3),
     (("agent", "velocity"), 10.0, "m/s", "millimetres a second", 1e-3),
@@ -95,6 +99,18 @@ def lone_mesh_warnings(file: str, reflectors: Sequence[Reflector]) -> Iterator[F
             yield warning_at(file, f"reflector[{number}].units ({one.name})", message, mend)
 
 
+def units_that_fit(value: Floats, fits: Callable[[Floats], Any]) -> tuple[str, str] | None:
+    """What lengths (...,) [m] of a scene file would be in each unit in which they fit, in words, and how to mend them;
+    None if they fit in none."""
+    found = [(unit, UNITS[NAMES[unit]]) for unit in GUESSES if fits(value * UNITS[NAMES[unit]])]
+    if not found:
+        return None
+    said = [f"in {unit} {{}}{np.round(value * factor, 6).tolist()} m" for unit, factor in found]
+    factors = " or ".join(f"{factor:g}" for _, factor in found)
+    words = ", ".join([said[0].format("it would be "), *(one.format("") for one in said[1:])])
+    return words, f"give metres: multiply by {factors}"
+
+
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
     """Message that the room's size looks as if in a wrong unit, and how to mend it; None if it does not."""
     size = bounds[1] - bounds[0]
@@ -112,17 +128,14 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
 
 
 def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator[Finding]:
-    """Scene check: warning of a point far outside the room that would lie inside it in another unit."""
+    """Scene check: warning of a point far outside the room that would lie inside it in another unit, or several."""
     size = float(np.max(bounds[1] - bounds[0]))
     away = np.maximum(np.maximum(bounds[0] - point, point - bounds[1]), 0.0).max()
     if away <= FAR * size:
         return
-    for unit, name in NAMES.items():
-        meant = point * UNITS[name]
-        if (meant >= bounds[0]).all() and (meant <= bounds[1]).all():
-            message = f"{point.tolist()} is far outside the room; in {unit} it would be {np.round(meant, 6).tolist()} m"
-            yield warning_at(file, field, message, f"give metres: multiply by {UNITS[name]:g}")
-            return
+    meant = units_that_fit(point, lambda place: ((place >= bounds[0]) & (place <= bounds[1])).all())
+    if meant is not None:
+        yield warning_at(file, field, f"{point.tolist()} is far outside the room; {meant[0]}", meant[1])
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:

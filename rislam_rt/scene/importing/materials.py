@@ -124,11 +124,13 @@ class MaterialAssignment:
         return {"itu": itu, "thickness_m": THICKNESS[itu]}
 
     def by_hand(self, *names: str) -> dict[str, Any] | None:
-        """Material of an import that the user gave for any of the names; None if there is none."""
-        for pattern, table in self.choices.items():
-            if any(fnmatchcase(name, pattern) for name in names if name):
-                self.used.add(pattern)
-                return table
+        """Material of an import that the user gave for any of the names, also in other capitals if none is so written;
+        None if there is none."""
+        for fold in (str, str.casefold):
+            for pattern, table in self.choices.items():
+                if any(fnmatchcase(fold(name), fold(pattern)) for name in names if name):
+                    self.used.add(pattern)
+                    return table
         return None
 
     def remarks(self) -> list[str]:

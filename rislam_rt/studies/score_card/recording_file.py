@@ -79,7 +79,14 @@ def read_recording(path: str | Path) -> Recording:
     StoreError
         The file is missing or damaged, or holds something else.
     """
-    data = read_dataset(Path(path))
+    wanted = "give one that write_recording or rislam-rt score RUN --save FOLDER wrote"
+    try:
+        data = read_dataset(Path(path))
+    except StoreError:
+        what = "not a readable NetCDF file of a recording" if Path(path).exists() else "no such file"
+        raise StoreError(f"{path}: {what}; {wanted}") from None
+    if "true_position" not in data:
+        raise StoreError(f"{path}: no recording, for it holds no truth (true_position); {wanted}")
     try:
         marks, values = data.attrs, {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
         for name in ("landmark_audible", "wall_audible"):

@@ -48,6 +48,11 @@ class Truth(NamedTuple):
     relative_bound: Floats
     """(K,) [m] the same relative to the start, which then has no error."""
 
+    def __repr__(self) -> str:
+        panels = f"{self.panel} panel" if self.panel == 1 else f"{self.panel or 'no'} panels"
+        counts = f"{len(self.landmark)} landmarks ({panels} among them), {len(self.wall_middle)} walls"
+        return f"Truth: {len(self.position)} cycles, {counts}, {len(self.path_kind)} paths"
+
     def walls(self, shift: Floats) -> Surfaces:
         """Surfaces of the true walls of a room, moved by `shift` (3,) [m]."""
         return Surfaces(self.wall_middle + shift, self.wall_normal, self.wall_spread)

@@ -8,6 +8,7 @@ import pytest
 import rislam_rt
 from rislam_rt.cli.slam import _prior, command
 from rislam_rt.errors import ConfigError
+from rislam_rt.scene.motion.recorded_poses import MAX_HEADING
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.start_prior import heading_from_velocity
@@ -65,6 +66,16 @@ def test_heading_and_velocity_together_know_the_turn_as_drawn_velocities_do() ->
     by_velocity, by_heading = np.arctan(start.velocity_std / 0.5), start.heading_std
     assert (by_velocity**-2 + by_heading**-2) ** -0.5 == pytest.approx(off.std(), rel=0.01)  # of 1e5 draws: 0.2 %
     assert start.heading == pytest.approx(np.arctan2(-0.3, 0.4))
+
+
+@pytest.mark.parametrize("heading", [45.0, -30.0, np.nan])
+def test_a_heading_in_degrees_is_refused_where_radians_are_wanted(heading: float) -> None:
+    with pytest.raises(ConfigError, match=rf"^start\.heading: {heading:g} rad received; give radians, not degrees"):
+        StartPrior(np.zeros(3), np.zeros(3), heading)
+
+
+def test_a_heading_of_three_turns_as_a_recording_may_have_is_taken() -> None:
+    assert StartPrior(np.zeros(3), np.zeros(3), MAX_HEADING + 1.0).heading == MAX_HEADING + 1.0
 
 
 def test_a_heading_that_is_given_counts_and_is_as_exact_as_is_said(given: Given) -> None:

@@ -23,10 +23,15 @@ START = StartPrior(np.zeros(3), np.zeros(3), 0.0)
 
 
 def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpec) -> None:
-    """0.8 and 0.7: the squares sum to 1.13. Six digits of a ray on the horizon pass."""
+    """0.8 and 0.7: the squares sum to 1.13. A ray on the horizon passes in three digits and in six, and is level."""
     start, rows = StartPrior(np.zeros(3), np.zeros(3), 0.0), len(table["time_s"])
-    level = {"cos_x": rows * [round(np.cos(0.7), 6) + 1e-7], "cos_y": rows * [round(np.sin(0.7), 6) + 1e-7]}
-    inputs_of({**table, **level}, start, build_radio(spec.radio))
+    for digits in (3, 6):
+        up = 10.0**-digits * np.ceil(10.0**digits * np.array([np.cos(0.7), np.sin(0.7)]))
+        level = inputs_of({**table, "cos_x": rows * [up[0]], "cos_y": rows * [up[1]]}, start, build_radio(spec.radio))
+        assert np.linalg.norm(level.measurements[0].cosines, axis=-1).max() <= 1.0 + 1e-15
+    above = {"cos_x": rows * [np.cos(0.7) * 1.001], "cos_y": rows * [np.sin(0.7) * 1.001]}
+    with pytest.raises(ConfigError, match=r"squares that sum to 1\.002 in row 1"):
+        inputs_of({**table, **above}, start, build_radio(spec.radio))
     with pytest.raises(
         ConfigError, match=r"squares that sum to 1\.13 in row 1 .* divide both cosines by their norm\)$"
     ):
@@ -174,7 +179,11 @@ def test_a_file_of_another_kind_names_what_it_lacks(tmp_path: Path, spec: Pipeli
     with pytest.raises(ConfigError) as found:
         read_inputs(tmp_path / "scheme.nc", None, build_radio(spec.radio))
     said = str(found.value).removeprefix(f"{tmp_path / 'scheme.nc'}: ")
-    assert said == "No variable named 'start_position'; give one as a run folder's measurements_<scheme>.nc"
+    assert said.startswith("time, heading, tau, cosines, amplitude, start_position, ")
+    assert said.endswith(
+        "rx_offset: missing; give them as in a run folder's measurements_<scheme>.nc "
+        "(heading: NaN without a compass, with slam.heading=estimated)"
+    )
 
 
 @pytest.mark.parametrize(

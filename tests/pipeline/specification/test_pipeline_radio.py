@@ -8,6 +8,7 @@ import pytest
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Antennas, RadioConfig
+from rislam_rt.model.radio import CARRIERS
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
@@ -21,6 +22,16 @@ SECTORS = ("radio.tx_pattern=dipole", "radio.rx_pattern=tr38901", "radio.tx_pola
 def test_by_default_antennas_are_those_that_nobody_names():
     assert build_radio(RadioSection()).antennas == RadioConfig().antennas == Antennas()
     assert load_radio(()) == RadioConfig()
+
+
+def test_a_carrier_in_gigahertz_is_refused_in_the_range_of_a_pipeline_file():
+    for carrier in (10, 9.9e5, 3.1e12):
+        with pytest.raises(ConfigError) as refused:
+            RadioConfig(carrier=carrier, bandwidth=1)
+        said = f"radio.carrier: {carrier:g} Hz received; give 1e+06 to 3e+12 Hz, 10e9 for 10 GHz"
+        assert str(refused.value) == said
+    ends = (build_radio(RadioSection(carrier_ghz=ghz, bandwidth_ghz=1e-3)).carrier for ghz in (1e-3, 3000.0))
+    assert tuple(ends) == CARRIERS
 
 
 def test_patterns_and_polarisations_arrive_in_the_radio():

@@ -135,6 +135,20 @@ def test_bad_override_is_laid_to_the_command_line(write, setting):
         load_spec(write(MINIMAL), [setting])
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (({"cycles": 3},), "path: dict received; give a str or PathLike"),
+        (("trace_then_slam", "cycles=3"), "overrides: 'cycles=3' received; give a list of settings, e.g. ['radio."),
+        (("trace_then_slam", {"cycles": 3}), "overrides: dict received; give a list of settings, e.g. ['radio."),
+    ],
+)
+def test_an_argument_of_another_type_is_one_line(arguments, said):
+    with pytest.raises(ConfigError) as refused:
+        load_spec(*arguments)
+    assert str(refused.value).startswith(said)
+
+
 @pytest.mark.parametrize("setting", ["slam.use_vt=maybe", "motion.sigma_a_m_s2=-3", "bp_slam.sigma_a=-1"])
 def test_a_setting_handed_on_to_other_sections_is_complained_about_once(write, setting):
     with pytest.raises(ConfigError) as caught:

@@ -10,7 +10,7 @@ from rislam_rt.cli.config import command
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.settings_list import Setting, explain, list_settings
-from rislam_rt.shipped import room_beside, shipped_pipelines
+from rislam_rt.shipped import find_pipeline, room_beside, shipped_pipelines
 from rislam_rt.studies import load_any
 
 SETTINGS = {one.key: one for one in list_settings(PipelineSpec)}
@@ -65,13 +65,28 @@ def test_no_setting_is_left_out() -> None:
     ],
 )
 def test_default_range_and_unit(key: str, default: object, allowed: str, unit: str) -> None:
-    found = SETTINGS[key]
-    assert (found.default, found.allowed, found.unit) == (default, allowed, unit)
+    one = SETTINGS[key]
+    assert (one.default, one.allowed, one.unit) == (default, allowed, unit)
+
+
+def found(key: str) -> list[str]:
+    """Keys of the settings that `--explain KEY` tells about."""
+    return [one.key for one in explain(list(SETTINGS.values()), key)]
+
+
+def test_a_table_is_told_whole_before_settings_of_its_name_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
+    """Of `motion` only `slam.motion` was told."""
+    assert found("motion") == ["motion.sigma_a_m_s2", "motion.look_std_deg", "slam.motion"]
+    assert found("told") == [key for key in SETTINGS if key.startswith("told.")] + ["hardware.told"]
+    assert found("radio.array") == [key for key in SETTINGS if key.startswith("radio.array.")]
+    command(find_pipeline("trace_then_slam"), explain="motion")
+    told = [part.partition(" ")[0] for part in capsys.readouterr().out.split("\n\n")]
+    assert told == found("motion")
 
 
 def test_one_setting_is_found_by_its_last_name() -> None:
-    assert explain(list(SETTINGS.values()), "mutation").key == "design.mutation"
-    assert explain(list(SETTINGS.values()), "name").key == "name"
+    assert found("mutation") == ["design.mutation"]
+    assert found("name") == ["name"]
     with pytest.raises(ConfigError, match=r"give one of slam\.sigma_a"):
         explain(list(SETTINGS.values()), "sigma_a")
     with pytest.raises(ConfigError, match=r"did you mean 'radio\.carrier_ghz'"):

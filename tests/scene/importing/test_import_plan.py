@@ -12,6 +12,7 @@ from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
+from rislam_rt.scene.importing.materials import parse_choices
 
 WALL, DOOR, WINDOW = (0.1, 0.9, 2.0), (1.0, 1.9, 2.0), (3.0, 4.5, 2.1)
 
@@ -101,6 +102,22 @@ def test_doors_are_holes_and_windows_glass(two_rooms: Path, tmp_path: Path) -> N
     through = np.array([[[2.0, 1.5, 1.0], [6.0, 1.5, 1.0]], [[2.0, 1.5, 2.2], [6.0, 1.5, 2.2]]])
     blocked, _ = crossings(through[:, 0], through[:, 1], surface(scene))
     assert blocked.tolist() == [1]
+
+
+def test_the_name_of_a_material_is_found_in_any_capitals_and_as_written_first(tmp_path: Path) -> None:
+    """The file's own spelling was `nothing has that name`."""
+    features = [
+        feature("room", box(0, 0, 4, 3)), feature("wall", [[0.5, 1.5], [2.0, 1.5]], name="Trennwand"),
+        feature("wall", [[2.5, 2.0], [3.5, 2.0]], name="Tafel"),
+    ]  # fmt: skip
+    (tmp_path / "plan.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    given = parse_choices(["Trennwand=reflection:0.5", "TAFEL=itu:brick", "tafel=itu:metal", "T*=itu:brick"])
+    with pytest.raises(SceneError, match=r"--material T\*: nothing has that name"):
+        import_room(tmp_path / "plan.geojson", tmp_path / "room", ImportOptions(materials=given))
+    del given["T*"], given["TAFEL"]
+    import_room(tmp_path / "plan.geojson", tmp_path / "room", ImportOptions(materials=given))
+    material = {r.name: r.material for r in load_scene(tmp_path / "room").reflectors}
+    assert (material["trennwand"].reflection, material["tafel"].itu) == (0.5, "metal")
 
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 320">

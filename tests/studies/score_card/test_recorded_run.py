@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import rislam_rt
-from rislam_rt.errors import ConfigError, ResultError
+from rislam_rt.errors import ConfigError, ResultError, StoreError
 from rislam_rt.model import Scene
 from rislam_rt.pipeline import PipelineSpec, load_spec, run_slam
 from rislam_rt.pipeline.long import slices
@@ -140,5 +140,31 @@ def test_what_is_no_run_or_lacks_its_measurements_is_told(folder: Path, tmp_path
         next(recorded_run.recorded_schemes(result, tmp_path))
     data = xr.open_dataset(folder / "measurements_random.nc", engine="h5netcdf").load()
     data.drop_vars("tau").to_netcdf(tmp_path / "measurements_random.nc", engine="h5netcdf")
-    with pytest.raises(ResultError, match=r"measurements_random.nc: damaged \(KeyError: .*; run again"):
+    with pytest.raises(ResultError, match=r"measurements_random.nc: damaged \(ConfigError: tau: missing; .*run again"):
         next(recorded_run.recorded_schemes(result, tmp_path))
+
+
+def test_the_truth_is_shown_in_one_line(recordings: dict[str, rislam_rt.Recording]) -> None:
+    truth = recordings["random"].truth
+    landmarks, walls, paths = len(truth.landmark), len(truth.wall_middle), len(truth.path_kind)
+    about = f"{landmarks} landmarks (1 panel among them), {walls} walls, {paths} paths"
+    assert repr(truth) == f"Truth: {CYCLES} cycles, {about}"
+    assert "(no panels among them)" in repr(truth._replace(panel=0))
+    assert "(2 panels among them)" in repr(truth._replace(panel=2))
+
+
+def test_what_is_no_recording_says_what_to_give(
+    folder: Path, recordings: dict[str, rislam_rt.Recording], tmp_path: Path
+) -> None:
+    wanted = "give one that write_recording or rislam-rt score RUN --save FOLDER wrote"
+    file = tmp_path / "mine.csv"
+    for text, said in ((None, "no such file"), ("time_s,delay_s\n", "not a readable NetCDF file of a recording")):
+        if text is not None:
+            file.write_text(text)
+        with pytest.raises(StoreError) as found:
+            rislam_rt.read_recording(file)
+        assert str(found.value) == f"{file}: {said}; {wanted}"
+    measured = folder / "measurements_random.nc"
+    with pytest.raises(StoreError) as found:
+        rislam_rt.read_recording(measured)
+    assert str(found.value) == f"{measured}: no recording, for it holds no truth (true_position); {wanted}"

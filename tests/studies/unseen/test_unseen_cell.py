@@ -96,11 +96,14 @@ def test_plain_arrays_are_scored_like_an_estimator(tmp_path: Path) -> None:
         ({"maps": empty_map()}, "maps: one MapEstimate received"),
         ({"maps": [slanted]}, f"cycle {cycles - 1}: map: wall_normal"),
         ({"maps": cycles * [None]}, "cycle 0: map: NoneType received"),
+        ({"covariance": np.full((cycles, 3, 3), np.nan)}, "cycle 0: covariance: NaN at index (0, 0)"),
         ({"covariance": np.tile(-np.eye(3), (cycles, 1, 1))}, "cycle 0: a covariance with an eigenvalue of -1"),
         ({"landmark": cycles * [np.zeros(0)]}, "landmark: cycle 0: shape (0,) received"),
     ):
         with pytest.raises(ConfigError, match=f"^{re.escape(said)}"):
             answers_from_arrays(inputs, told, **given)
+    with pytest.raises(ConfigError, match=r"^cycle 1: position: NaN at index \(2,\); give finite numbers"):
+        answers_from_arrays(inputs, np.where(np.arange(told.size).reshape(told.shape) == 5, np.nan, told))
     with pytest.raises(ConfigError, match=f"2 estimates of {cycles} cycles"):
         score_run(truth, inputs, answers_from_arrays(inputs, told)._replace(estimates=2 * [None]))
     with pytest.raises(ConfigError, match=r"estimator: object received; give an Estimator, or .* 'module:Class'"):
