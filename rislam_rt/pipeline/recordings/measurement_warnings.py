@@ -79,8 +79,8 @@ def _direct_paths(inputs: Inputs, spec: PipelineSpec) -> Iterator[str]:
     """Line about a user's own measurements whose direct path mostly arrives from elsewhere than where the Tx is, with
     the cause if another body frame explains it: the filter would take either for what it is told.
 
-    A path as long as from Tx to Rx, by `EARLY` and its own deviation, is the direct one; the array hears directions
-    whole periods apart alike.
+    A path as long as from Tx to Rx, by `EARLY` and five of its own deviations, is the direct one if these are less than
+    half of that: else a near wall's may be. The array hears directions whole periods apart alike.
     """
     span = inputs.body.tx_offset - inputs.body.rx_offset
     baseline, period = float(np.linalg.norm(span)), 1.0 / build_settings(spec).radio.array.spacing
@@ -88,8 +88,9 @@ def _direct_paths(inputs: Inputs, spec: PipelineSpec) -> Iterator[str]:
         return
     found = []
     for one in inputs.measurements:
-        late = np.abs(SPEED_OF_LIGHT * one.tau - baseline) - 5.0 * SPEED_OF_LIGHT * one.tau_std
-        near = np.flatnonzero((late < EARLY * baseline) & (one.cosines_std.max(axis=-1) < ASIDE / 2.0))
+        off, doubt = np.abs(SPEED_OF_LIGHT * one.tau - baseline), 5.0 * SPEED_OF_LIGHT * one.tau_std
+        direct = (off < EARLY * baseline + doubt) & (doubt < 0.5 * baseline)
+        near = np.flatnonzero(direct & (one.cosines_std.max(axis=-1) < ASIDE / 2.0))
         found += [one.cosines[near[np.argmax(one.amplitude[near])]]] if len(near) else []
     if 2 * len(found) < len(inputs.measurements):
         return
